@@ -1,0 +1,32 @@
+#pragma once
+
+#include "core/finding.h"
+#include "core/photo.h"
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+namespace insitu {
+
+/// One exposure of a bracket.
+struct BracketFrame {
+    std::string name;  ///< for messages: the file's name
+    EncodedImage image;
+    double relative_exposure = 0.0;  ///< Exposure::relative(), > 0
+};
+
+/// Exposures of one scene from one place: equal sizes, sorted from longest to shortest exposure.
+struct Bracket {
+    std::vector<BracketFrame> frames;
+    PhotoMetadata metadata;  ///< of the first file: camera make and model
+    Findings findings;
+};
+
+/// Reads and checks a bracket. `overrides[i]` replaces what EXIF says about file i, member by
+/// member. InputError: unequal sizes, no exposure known (naming the file and the remedy), no file.
+/// Findings: "bracket-single-exposure", "bracket-duplicate-exposure".
+[[nodiscard]] Bracket readBracket(const std::vector<std::filesystem::path>& files,
+                                  const std::vector<Exposure>& overrides = {});
+
+}  // namespace insitu

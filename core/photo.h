@@ -1,0 +1,50 @@
+#pragma once
+
+#include "core/exposure.h"
+#include "core/image.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace insitu {
+
+/// Display- or camera-encoded RGB codes, 8 or 16 bit. Never used in lighting arithmetic: the
+/// type is different from RadianceImage so that the two cannot be mixed.
+struct EncodedImage {
+    Image<glm::u16vec3> codes;
+    int max_code = 255;  ///< 255 (8 bit) or 65535 (16 bit)
+};
+
+/// What the camera wrote beside the pixels. Unknown = absent or empty.
+struct PhotoMetadata {
+    Exposure exposure;
+    std::optional<double> focal_mm;
+    std::optional<double> focal_35mm;  ///< FocalLengthIn35mmFilm
+    /// Focal length in pixels of the image's long side when EXIF tells enough
+    /// (focal-plane resolution, or the 35 mm equivalent against the film's 36 mm / diagonal).
+    std::optional<double> focal_px;
+    std::string make;
+    std::string model;
+    int orientation = 1;             ///< as stored; pixels handed out are already upright
+    bool has_icc_profile = false;    ///< a profile was embedded (not converted yet)
+    std::vector<std::uint8_t> exif;  ///< the raw block ("Exif\0\0…"), to be copied into outputs
+};
+
+/// An encoded photograph as read from file, upright.
+struct Photo {
+    EncodedImage image;
+    PhotoMetadata metadata;
+};
+
+/// Scene-linear image, Rec. 709 primaries, finite and >= 0.
+///
+/// Unit: camera-relative radiance, i.e. linearised exposure / Exposure::relative(), unless a
+/// comment at the function that made it says otherwise.
+struct RadianceImage {
+    Image<Rgb> pixels;
+    Exposure exposure;  ///< of the photograph it came from; empty for merged or rendered ones
+};
+
+}  // namespace insitu

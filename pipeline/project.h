@@ -1,0 +1,68 @@
+#pragma once
+
+#include "calib/camera_solve.h"
+#include "capture/light_probe.h"
+#include "core/finding.h"
+#include "core/mesh.h"
+#include "core/photo.h"
+#include "reconstruct/scene_proxy.h"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace insitu {
+
+/// A photograph named by a project, with exposure members that override EXIF.
+struct ProjectImage {
+    std::filesystem::path path;
+    Exposure exposure;  ///< only what the project file gives
+};
+
+enum class ProbeKind { MirrorBall, LatLong };
+
+/// `light.probe`: a bracket of a light probe.
+struct ProjectProbe {
+    ProbeKind kind = ProbeKind::MirrorBall;
+    std::vector<ProjectImage> images;
+    MirrorBall ball;  ///< center_m is set from `center_m`
+    glm::dvec3 center_m{0.0};
+    /// The camera of the ball pictures: its place, or nothing when it is the photograph's camera.
+    std::optional<glm::dvec3> view_position_m;
+    glm::dvec2 crop_origin_px{0.0};
+    std::optional<std::filesystem::path> response;  ///< a saved response curve
+};
+
+struct ProjectLight {
+    std::optional<ProjectProbe> probe;
+    std::optional<std::filesystem::path> environment;  ///< instead of a probe
+    glm::dvec3 center_m{0.0};                          ///< where the environment was captured
+};
+
+/// A solid or mesh proxy and openings are in RoomDescription; meshes are loaded by readProject.
+struct ProjectObject {
+    std::filesystem::path model;
+    bool pivot_bottom_center = false;
+    glm::dvec3 position_m{0.0};
+    double rotation_y_deg = 0.0;
+    double scale = 1.0;
+    std::optional<Material> material;  ///< replaces the model's wholly
+};
+
+/// project.json, version 1, checked; every path is absolute.
+struct Project {
+    std::filesystem::path file;
+    ProjectImage photo;
+    std::optional<std::filesystem::path> camera_lines;
+    std::optional<std::filesystem::path> camera_file;
+    ProjectLight light;
+    RoomDescription room;
+    std::vector<ProjectObject> objects;
+};
+
+/// Reads and checks a project file. InputError: file, position ("objects[0].scale"), cause, remedy
+/// (a misspelt key gets a suggestion).
+[[nodiscard]] Project readProject(const std::filesystem::path& path);
+
+}  // namespace insitu

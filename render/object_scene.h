@@ -1,0 +1,48 @@
+#pragma once
+
+#include "core/mesh.h"
+#include "reconstruct/ray_scene.h"
+#include "render/bsdf/bsdf.h"
+
+#include <memory>
+#include <vector>
+
+namespace insitu {
+
+/// A point on an object, ready to be shaded.
+struct SurfacePoint {
+    double distance_m = 0.0;
+    glm::dvec3 position{0.0};
+    glm::dvec3 geometric_normal{0.0};  ///< unit, on the side the ray came from
+    glm::dvec3 shading_normal{0.0};    ///< unit, same side as the geometric one
+    SurfaceMaterial material;
+    std::size_t object = 0;
+};
+
+/// The placed objects: what scatters light. Holds triangles in world space and their textures.
+class ObjectScene {
+public:
+    struct Object {
+        Model model;  ///< mesh already placed in the world
+    };
+    explicit ObjectScene(std::vector<Object> objects);
+    ~ObjectScene();
+    ObjectScene(ObjectScene&&) noexcept;
+
+    [[nodiscard]] bool empty() const;
+    /// Axis-aligned bounds of one object, for bounding cones.
+    [[nodiscard]] const std::vector<BoundingBox>& bounds() const;
+    /// Alpha-masked texels let rays pass; a single-sided back face is shaded like a front face.
+    [[nodiscard]] std::optional<SurfacePoint> intersect(glm::dvec3 origin,
+                                                        glm::dvec3 direction,
+                                                        double max_distance_m = kInfinity) const;
+    [[nodiscard]] bool occluded(glm::dvec3 origin,
+                                glm::dvec3 direction,
+                                double max_distance_m) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace insitu
