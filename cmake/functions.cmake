@@ -25,7 +25,7 @@ function(insitu_test path)
   get_filename_component(folder ${path} DIRECTORY)
   string(REPLACE "/" "_" folder "${folder}")
   set(target ${folder}_${name})
-  add_executable(${target} ${path}.cpp)
+  add_executable(${target} ${PROJECT_SOURCE_DIR}/tests/${path}.cpp)
   target_link_libraries(${target} PRIVATE ${arg_DEPS} insitu_test_support GTest::gmock_main
                         insitu_options)
   add_test(NAME ${folder}.${name} COMMAND ${target})
