@@ -29,7 +29,10 @@ struct CommonOptions {
     bool strict = false;  ///< --strict: a warning makes the exit code 4
     int threads = 0;      ///< --threads: 0 = all
     std::uint64_t seed = 1;
+    std::string color = "auto";  ///< --color: auto (a terminal without NO_COLOR), always, never
 };
+
+class TerminalProgress;
 
 /// What a command uses to talk to the user; one per run.
 class Context {
@@ -37,14 +40,17 @@ public:
     CommonOptions options;
     int exit_code = kDone;
 
-    /// Adds --force, -q, --strict, --threads, --seed to a subcommand.
+    /// Adds --force, -q, --strict, --threads, --seed, --color to a subcommand.
     void addCommonOptions(CLI::App& command);
     /// To be called first by every command: applies --threads.
     void start();
-    /// InputError when `path` exists and --force was not given, or its folder is missing.
+    /// InputError when `path` exists and --force was not given, when its folder is missing or when
+    /// it is itself a folder. To be called before the work, for every output.
     void checkOutput(const std::filesystem::path& path) const;
     /// Findings to stderr with their codes; remembers warnings for --strict.
     void print(const Findings& findings);
+    /// One line on stderr, printed even with --quiet: why the run failed.
+    void printError(const std::string& message);
     /// A bar with ETA on a terminal, a line per 10 % otherwise, nothing with --quiet. Cancelled by
     /// Ctrl-C.
     [[nodiscard]] Progress& progress();
@@ -53,7 +59,9 @@ public:
     ~Context();
 
 private:
-    std::unique_ptr<Progress> progress_;
+    void printLabelled(Severity severity, const std::string& code, const std::string& message);
+
+    std::unique_ptr<TerminalProgress> progress_;
 };
 
 /// One function per command file: adds the subcommand and its callback to `app`.
