@@ -40,7 +40,7 @@ struct ProjectLight {
     glm::dvec3 center_m{0.0};                          ///< where the environment was captured
 };
 
-/// A solid or mesh proxy and openings are in RoomDescription; meshes are loaded by readProject.
+/// A piece of furniture to insert; see Placement for the order of pivot, scale, rotation, move.
 struct ProjectObject {
     std::filesystem::path model;
     bool pivot_bottom_center = false;
@@ -61,8 +61,15 @@ struct Project {
     std::vector<ProjectObject> objects;
 };
 
-/// Reads and checks a project file. InputError: file, position ("objects[0].scale"), cause, remedy
-/// (a misspelt key gets a suggestion).
+/// Reads and checks a project file (docs/file_format.md). InputError: file, position
+/// ("objects[0].scale"), cause, remedy (a misspelt key gets a suggestion). Every file that the
+/// project names must exist; an object's position must lie in the room's box when there is one.
 [[nodiscard]] Project readProject(const std::filesystem::path& path);
+
+/// Where the object stands, given its model's mesh as loaded (the pivot needs its bounds).
+[[nodiscard]] Placement placementOf(const ProjectObject& object, const TriangleMesh& mesh);
+/// The object's model, loaded, brought into the world, with its material replaced when the project
+/// says so. InputError as readModel.
+[[nodiscard]] Model loadPlaced(const ProjectObject& object);
 
 }  // namespace insitu

@@ -1,0 +1,35 @@
+#pragma once
+
+#include "core/io/json.h"
+#include "pipeline/project.h"
+
+#include <filesystem>
+
+namespace insitu {
+
+/// Pieces of a project file that other files share (room.json of `insitu simulate`). Included only
+/// by .cpp files. All throw InputError with file, position, cause and remedy.
+
+/// The file a text names, relative to `folder`; an error when it is not there.
+[[nodiscard]] std::filesystem::path existingFile(const JsonNode& node,
+                                                 const std::filesystem::path& folder);
+/// `material` of an object: pure numbers, no textures.
+[[nodiscard]] Material readMaterial(const JsonNode& node);
+/// One entry of `objects`.
+[[nodiscard]] ProjectObject readObject(const JsonNode& node, const std::filesystem::path& folder);
+/// `position_m`, `rotation_y_deg`, `scale` and `pivot` beside a `model`.
+[[nodiscard]] ProjectObject readPlacedModel(const JsonNode& node,
+                                            const std::filesystem::path& folder);
+/// The whole `room` list.
+[[nodiscard]] RoomDescription readRoom(const JsonNode& node, const std::filesystem::path& folder);
+/// `min_m` and `max_m` of a box, checked.
+[[nodiscard]] RoomBox readBox(const JsonNode& node);
+/// `corners_m`: at least three points of a flat convex polygon.
+[[nodiscard]] std::vector<glm::dvec3> readPolygon(const JsonNode& node);
+/// A number in [0, 1].
+[[nodiscard]] double readFraction(const JsonNode& node);
+/// A text that must be one of `choices`; else an error that lists them.
+[[nodiscard]] std::string readChoice(const JsonNode& node,
+                                     std::initializer_list<std::string_view> choices);
+
+}  // namespace insitu

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <initializer_list>
+#include <string_view>
+
+namespace insitu::keys {
+
+/// The keys each object of a project file may have. The parser accepts exactly these, and a test
+/// compares them with docs/project.schema.json, so that neither moves without the other.
+using KeyList = std::initializer_list<std::string_view>;
+
+inline const KeyList kProject = {
+    "format", "version", "photo", "camera", "light", "room", "objects"};
+inline const KeyList kImage = {"image", "exposure_seconds", "f_number", "iso"};
+inline const KeyList kCamera = {"lines", "file"};
+inline const KeyList kLight = {"probe", "environment", "center_m"};
+inline const KeyList kProbe = {"kind",
+                               "images",
+                               "exposure_seconds",
+                               "f_number",
+                               "iso",
+                               "ball",
+                               "center_m",
+                               "view",
+                               "response"};
+inline const KeyList kBall = {
+    "center_px", "radius_px", "radius_m", "reflectance", "crop_origin_px"};
+inline const KeyList kView = {"position_m"};
+inline const KeyList kFloor = {"type", "height_m", "half_size_m"};
+inline const KeyList kPlane = {"type", "corner_m", "edge_u_m", "edge_v_m", "corners_m"};
+inline const KeyList kBox = {"type", "min_m", "max_m", "solid", "name"};
+inline const KeyList kMesh = {
+    "type", "model", "position_m", "rotation_y_deg", "scale", "pivot", "name"};
+inline const KeyList kOpening = {"type", "corners_m", "name"};
+inline const KeyList kObject = {
+    "model", "pivot", "position_m", "rotation_y_deg", "scale", "material"};
+inline const KeyList kMaterial = {"base_color_linear", "roughness", "metallic", "specular"};
+
+}  // namespace insitu::keys
