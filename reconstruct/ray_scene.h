@@ -36,7 +36,8 @@ public:
         std::function<bool(std::uint32_t mesh, std::uint32_t triangle, glm::vec2 barycentric)>;
 
     /// The meshes are copied into the acceleration structure; the filter (optional) is kept and is
-    /// asked only for meshes whose flag in `filtered` is set.
+    /// asked only for meshes whose flag in `filtered` is set; it must not throw. Triangles without
+    /// area or with non-finite vertices are never hit. An index out of range is a LogicError.
     explicit RayScene(std::span<const TriangleMesh* const> meshes,
                       std::span<const bool> filtered = {},
                       HitFilter filter = nullptr);
@@ -54,13 +55,21 @@ public:
                                 double max_distance_m = kInfinity) const;
     [[nodiscard]] bool empty() const;
 
+    /// The point moved off its surface, along the normal to the side of `direction`, far enough
+    /// that a ray from it does not hit the surface again, by this scene's own numerical error:
+    /// scales with the scene's size and does not grow with its distance from the world's origin.
+    [[nodiscard]] glm::dvec3 offsetOrigin(glm::dvec3 point,
+                                          glm::dvec3 unit_normal,
+                                          glm::dvec3 direction) const;
+
 private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
 
-/// The point moved off its surface, along the normal to the side of `direction`, far enough that a
-/// ray from it does not hit the surface again. Scales with the magnitude of the coordinates.
+/// The same for callers that do not know the scene: by the magnitude of the coordinates, for
+/// scenes in metres that are no larger than a few tens of metres around the world's origin.
+/// Prefer RayScene::offsetOrigin.
 /// Source: [WacBin19], Waechter & Binder, "A fast and robust method for avoiding
 /// self-intersection".
 [[nodiscard]] glm::dvec3 offsetOrigin(glm::dvec3 point,
