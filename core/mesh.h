@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -66,7 +67,16 @@ struct BoundingBox {
     glm::dvec3 min{0.0};
     glm::dvec3 max{0.0};
 };
+/// Of all vertices; zeros for a mesh without any.
 [[nodiscard]] BoundingBox boundingBox(const TriangleMesh& mesh);
+
+/// A model's largest side, once scaled, lies between these; else its unit was guessed wrong.
+inline constexpr double kMinModelExtent_m = 0.001;
+inline constexpr double kMaxModelExtent_m = 50.0;
+/// Warning "model-extent-implausible" when the box (in metres, after scaling) is beyond those;
+/// nothing otherwise. `name` is for the message.
+[[nodiscard]] std::optional<Finding> extentFinding(const BoundingBox& box_in_metres,
+                                                   const std::string& name);
 
 /// Where a model stands: x_in_world = position + R_y(rotation)·scale·(x_in_model − pivot).
 ///
@@ -84,9 +94,10 @@ struct Placement {
 /// Mesh with every vertex and normal brought into the world.
 [[nodiscard]] TriangleMesh placed(const TriangleMesh& mesh, const Placement& placement);
 
-/// Finds what would hurt a renderer: non-finite vertices, indices out of range, no triangles
-/// (InputError naming `path`); drops degenerate triangles and repairs non-unit normals (findings
-/// "mesh-degenerate-triangles", "mesh-normals-repaired").
+/// Finds what would hurt a renderer: non-finite vertices, indices out of range, arrays of unequal
+/// length, no triangles (InputError naming `path`); drops degenerate triangles and repairs non-unit
+/// normals (findings "mesh-degenerate-triangles", "mesh-normals-repaired"); drops vertices that no
+/// triangle uses, so that the bounding box is that of what is seen.
 void validateMesh(Model& model, const std::string& path);
 
 }  // namespace insitu
