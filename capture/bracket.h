@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace insitu {
@@ -24,9 +25,14 @@ struct Bracket {
 };
 
 /// Reads and checks a bracket. `overrides[i]` replaces what EXIF says about file i, member by
-/// member. InputError: unequal sizes, no exposure known (naming the file and the remedy), no file.
-/// Findings: "bracket-single-exposure", "bracket-duplicate-exposure".
+/// member; it is empty or has one entry a file. InputError: unequal sizes, no exposure known
+/// (naming the file and the remedy), no file.
+/// Findings: "bracket-single-exposure", "bracket-duplicate-exposure", "bracket-mixed-cameras",
+/// "bracket-partial-exposure" (f-number or ISO known for some frames only).
 [[nodiscard]] Bracket readBracket(const std::vector<std::filesystem::path>& files,
                                   const std::vector<Exposure>& overrides = {});
+
+/// The same checks and order for frames that are already in memory.
+[[nodiscard]] Bracket makeBracket(std::vector<BracketFrame> frames, PhotoMetadata metadata = {});
 
 }  // namespace insitu

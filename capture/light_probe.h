@@ -21,7 +21,8 @@ struct MirrorBall {
 };
 
 /// The camera that looked at the ball from `position_m`: towards its centre, Y up, focal length
-/// radius_px / tan(asin(radius_m / distance)), principal point at center_px.
+/// radius_px / tan(asin(radius_m / distance)), principal point at center_px. A camera inside the
+/// ball or straight above or below it is an InputError.
 [[nodiscard]] Camera ballCamera(const MirrorBall& ball,
                                 glm::dvec3 position_m,
                                 int width,
@@ -34,7 +35,7 @@ struct UnwrapOptions {
     glm::dvec2 crop_origin_px{0.0};
     /// Distance in metres to what is seen from a point in a direction (the room proxy), so that the
     /// reflected rays, which start on the ball and not at its centre, are put where they belong.
-    /// Absent: everything is far away.
+    /// Called from several threads; infinity where nothing is near. Absent: everything is far away.
     std::function<double(glm::dvec3 origin, glm::dvec3 direction)> distance_to_room;
 };
 
@@ -47,10 +48,24 @@ struct LightProbe {
 /// Mirror-ball picture (radiance) -> equirectangular environment, exact for a ball at finite
 /// distance; every texel is an average over its solid angle. The blind spot behind the ball takes
 /// the radiance at the ball's rim nearest in direction; finding "probe-blind-spot" (share of the
-/// sphere).
+/// sphere). The outermost 1.5 pixels of the outline mix ball and background and are not used.
+///
+/// The ball's outline as `camera` sees it is moved and scaled onto the measured one (center_px,
+/// radius_px), which takes out small errors of the camera; when they differ by more than 2 % of
+/// the radius, finding "probe-outline-mismatch". "probe-outside-image": the picture cuts the ball.
+/// InputError: a ball or camera without meaning, an image with NaN or infinity.
 [[nodiscard]] LightProbe unwrapMirrorBall(const Image<Rgb>& radiance,
                                           const MirrorBall& ball,
                                           const Camera& camera,
                                           const UnwrapOptions& options);
+
+/// An equirectangular picture, resampled by area to `width` (0: as it is). It must be twice as
+/// wide as high (InputError).
+[[nodiscard]] LightProbe probeFromLatLong(const Image<Rgb>& radiance, int width);
+
+/// An angular map: a square picture whose inscribed disc shows the whole sphere, distance from the
+/// middle proportional to the angle from −z, +x to the right, +y up. Width 0: the picture's
+/// resolution. Source: [Debevec98], the "light probe" format of his gallery.
+[[nodiscard]] LightProbe probeFromAngularMap(const Image<Rgb>& radiance, int width);
 
 }  // namespace insitu

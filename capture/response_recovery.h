@@ -3,16 +3,18 @@
 #include "capture/bracket.h"
 #include "core/response_curve.h"
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 namespace insitu {
 
 struct ResponseOptions {
-    /// Pixel positions used. Unitless, >= 50.
-    int samples = 400;
-    /// Weight of the second-derivative penalty on log exposure ([DebMal97] eq. 3, lambda). > 0.
-    double smoothness = 20.0;
+    /// Places of the picture used (small flat patches). Unitless, >= 50.
+    int samples = 1500;
+    /// Weight of the curvature penalty ([DebMal97] eq. 3, lambda). Unitless, >= 0; 0 chooses it
+    /// by cross-validation between two halves of the samples.
+    double smoothness = 0.0;
 
     /// Every problem at once, so that one run reports them all.
     [[nodiscard]] Findings validate() const;
@@ -20,14 +22,18 @@ struct ResponseOptions {
 
 struct ResponseRecovery {
     ResponseCurve curve;
-    /// RMS over samples of ln(exposure) predicted by two frames for one pixel, per channel.
+    /// RMS over samples of ln(exposure) predicted by two frames for one place, per channel.
     std::array<double, 3> residual{};
+    /// The curvature weight used, per channel.
+    std::array<double, 3> smoothness{};
+    /// "response-not-recoverable", "response-partly-extrapolated" (codes no sample reached)
     Findings findings;
 };
 
 /// Response of the camera that took the bracket, by Debevec & Malik's linear least squares
-/// [DebMal97]. At least two different exposures with overlapping unclipped codes are needed:
-/// otherwise the sRGB curve is returned with finding "response-not-recoverable".
+/// [DebMal97], with patches instead of single pixels: see response_recovery.cpp. At least two
+/// different exposures with overlapping unclipped codes are needed: otherwise the sRGB curve is
+/// returned with finding "response-not-recoverable". Bad options are an InputError.
 [[nodiscard]] ResponseRecovery recoverResponse(const Bracket& bracket,
                                                const ResponseOptions& options);
 
