@@ -5,13 +5,23 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace insitu {
 
+/// What a user marks in a photograph to calibrate its camera (`lines.json`, docs/file_format.md).
+///
+/// Common rules: pixels in the convention of core/camera.h, in the upright photograph, and lengths
+/// in metres. Points may lie outside the picture (a line drawn beyond its edge). Every complaint
+/// is an InputError that names the file and the place in it ("segments[3].to_px").
+
 enum class RoomAxis { X = 0, Y = 1, Z = 2 };
 
-/// An image segment that runs along a direction of the room.
+/// "x", "y" or "z".
+[[nodiscard]] const char* axisName(RoomAxis axis);
+
+/// An image segment that runs along a direction of the room. Which end is named first is free.
 struct LineSegment {
     RoomAxis axis = RoomAxis::X;
     glm::dvec2 from_px{0.0};
@@ -21,22 +31,31 @@ struct LineSegment {
 /// A length known in metres: both ends on the floor, or from a floor point straight up.
 struct KnownLength {
     enum class On { Floor, Vertical };
-    glm::dvec2 from_px{0.0};
+    glm::dvec2 from_px{0.0};  ///< for Vertical: the end on the floor
     glm::dvec2 to_px{0.0};
     On on = On::Floor;
     double metres = 0.0;
 };
 
-/// What the user marked in the photograph (`lines.json`, docs/file_format.md).
+/// What the user marked in the photograph.
 struct LineSet {
     int width = 0;
     int height = 0;
     std::vector<LineSegment> segments;
     glm::dvec2 origin_px{0.0};  ///< where the world's origin, a floor point, is seen
     std::optional<double> camera_height_m;
+    double camera_height_sigma_m = 0.0;  ///< 1σ of camera_height_m, 0 = exact
     std::vector<KnownLength> lengths;
+
+    /// Throws InputError (naming `source`) unless sizes are positive, all numbers finite, every
+    /// segment at least a pixel long and every length positive.
+    void check(const std::string& source) const;
 };
 
+/// Reads and checks `lines.json`. An unknown key is an error with a suggestion.
 [[nodiscard]] LineSet readLineSet(const std::filesystem::path& path);
+
+/// InputError unless the lines were marked in a picture of this size.
+void checkLinesMatchPhoto(const LineSet& lines, int width, int height, const std::string& source);
 
 }  // namespace insitu
