@@ -170,10 +170,10 @@ glm::dvec3 EnvironmentLight::drawSky(double u, double v) const
 
 std::optional<glm::dvec3> EnvironmentLight::drawDirection(std::span<const double> shares,
                                                           glm::dvec3 x,
-                                                          float selector,
+                                                          double selector,
                                                           glm::vec2 u) const
 {
-    double remaining = static_cast<double>(selector);
+    double remaining = selector;
     std::size_t strategy = shares.size();
     for (std::size_t i = 0; i < shares.size(); ++i) {
         if (!(shares[i] > 0.0)) continue;
@@ -190,9 +190,7 @@ std::optional<glm::dvec3> EnvironmentLight::drawDirection(std::span<const double
         if (!(distance > 0.0)) return std::nullopt;
         return (point - x) / distance;
     }
-    // A float holds 24 random bits, too few for a table of a million texels: the bits of u.x follow
-    // those of the selector.
-    const double fine = (remaining + static_cast<double>(u.x) * 0x1p-24) / shares[0];
+    const double fine = remaining / shares[0];
     return drawSky(fine, static_cast<double>(u.y));
 }
 
@@ -218,7 +216,9 @@ IncidentLight EnvironmentLight::arrive(std::span<const double> shares,
     return light;
 }
 
-std::optional<LightSample> EnvironmentLight::sample(glm::dvec3 x, float selector, glm::vec2 u) const
+std::optional<LightSample> EnvironmentLight::sample(glm::dvec3 x,
+                                                    double selector,
+                                                    glm::vec2 u) const
 {
     const std::span<const double> shares = sharesAt(x);
     const std::optional<glm::dvec3> direction = drawDirection(shares, x, selector, u);

@@ -47,7 +47,7 @@ public:
                               std::vector<AreaLamp> lamps = {});
 
     [[nodiscard]] std::optional<LightSample> sample(glm::dvec3 x,
-                                                    float selector,
+                                                    double selector,
                                                     glm::vec2 u) const override;
     [[nodiscard]] IncidentLight incident(glm::dvec3 x, glm::dvec3 direction) const override;
 
@@ -78,7 +78,7 @@ private:
     [[nodiscard]] glm::dvec3 drawSky(double u, double v) const;
     [[nodiscard]] std::optional<glm::dvec3> drawDirection(std::span<const double> shares,
                                                           glm::dvec3 x,
-                                                          float selector,
+                                                          double selector,
                                                           glm::vec2 u) const;
     /// Shares of the strategies at x: the environment first, then the targets. They sum to 1, or
     /// are all 0 when nothing shines.

@@ -36,7 +36,7 @@ public:
     /// u in [0,1)²; `selector` in [0,1) picks among lights. Nothing when the drawn direction brings
     /// no light (for example hidden from x by the room itself): counts as a sample of value 0.
     [[nodiscard]] virtual std::optional<LightSample> sample(glm::dvec3 x,
-                                                            float selector,
+                                                            double selector,
                                                             glm::vec2 u) const = 0;
     [[nodiscard]] virtual IncidentLight incident(glm::dvec3 x, glm::dvec3 direction) const = 0;
 };

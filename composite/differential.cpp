@@ -1,0 +1,188 @@
+#include "composite/differential.h"
+
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace insitu {
+
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+/// Mean over a square window (clamped at the border), separable running sums.
+Image<Rgb> boxFilter(const Image<Rgb>& image, int window)
+{
+    const int radius = window / 2;
+    const auto pass = [&](const Image<Rgb>& from, bool horizontal) {
+        Image<Rgb> to(from.width(), from.height());
+        const int lines = horizontal ? from.height() : from.width();
+        const int length = horizontal ? from.width() : from.height();
+        parallelFor(0, lines, [&](std::int64_t line) {
+            const int l = static_cast<int>(line);
+            const auto at = [&](int i) {
+                const int k = std::clamp(i, 0, length - 1);
+                return glm::dvec3(horizontal ? from(k, l) : from(l, k));
+            };
+            glm::dvec3 sum(0.0);
+            for (int i = -radius; i <= radius; ++i)
+                sum += at(i);
+            for (int i = 0; i < length; ++i) {
+                (horizontal ? to(i, l) : to(l, i)) = Rgb(sum / static_cast<double>(2 * radius + 1));
+                sum += at(i + radius + 1) - at(i - radius);
+            }
+        });
+        return to;
+    };
+    return pass(pass(image, true), false);
+}
+
+/// ρ/π of every pixel's receiver; 0 where there is none.
+Image<Rgb> reflectanceOverPi(const Image<Rgb>& photo,
+                             const RenderLayers& layers,
+                             const CompositeOptions& options)
+{
+    Image<Rgb> result(photo.width(), photo.height());
+    const float limit = static_cast<float>(options.max_reflectance) / kPi;
+    for (int y = 0; y < photo.height(); ++y)
+        for (int x = 0; x < photo.width(); ++x)
+            for (int c = 0; c < 3; ++c) {
+                const float irradiance = layers.irradiance_without(x, y)[c];
+                if (irradiance > 0.0f)
+                    result(x, y)[c] = std::min(photo(x, y)[c] / irradiance, limit);
+            }
+    return options.form == CompositeForm::Difference ? boxFilter(result, options.reflectance_window)
+                                                     : result;
+}
+
+}  // namespace
+
+Findings CompositeOptions::validate() const
+{
+    Findings findings;
+    const auto demand = [&](bool holds, const char* message) {
+        if (!holds) findings.push_back({Severity::Error, "option-out-of-range", message});
+    };
+    demand(reflectance_window >= 1 && reflectance_window % 2 == 1,
+           "reflectance_window must be odd and >= 1");
+    demand(max_reflectance > 0.0 && max_reflectance <= 1.0, "max_reflectance must be in (0, 1]");
+    demand(clip_fraction > 0.5 && clip_fraction <= 1.0, "clip_fraction must be in (0.5, 1]");
+    demand(influence_codes >= 0.0, "influence_codes must be >= 0");
+    return findings;
+}
+
+Image<Rgb> photographedRadiance(const EncodedImage& photo,
+                                const ResponseCurve& response,
+                                double relative_exposure)
+{
+    INSITU_CHECK(relative_exposure > 0.0, "relative exposure {}", relative_exposure);
+    // One table look-up a channel: every code of the picture's depth once.
+    std::array<std::vector<float>, 3> table;
+    for (int c = 0; c < 3; ++c) {
+        auto& channel = table[static_cast<std::size_t>(c)];
+        channel.resize(static_cast<std::size_t>(photo.max_code) + 1);
+        for (int code = 0; code <= photo.max_code; ++code)
+            channel[static_cast<std::size_t>(code)] = static_cast<float>(
+                response.decode(c, code * 255.0 / photo.max_code) / relative_exposure);
+    }
+    Image<Rgb> radiance(photo.codes.width(), photo.codes.height());
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
+        const glm::u16vec3 code = photo.codes.pixels()[i];
+        radiance.pixels()[i] = {table[0][code.r], table[1][code.g], table[2][code.b]};
+    }
+    return radiance;
+}
+
+Composite compositeDifferential(const EncodedImage& photo,
+                                const ResponseCurve& response,
+                                double relative_exposure,
+                                const RenderLayers& layers,
+                                const CompositeOptions& options)
+{
+    INSITU_CHECK(photo.codes.sameSize(layers.object),
+                 "photograph {}x{}, layers {}x{}",
+                 photo.codes.width(),
+                 photo.codes.height(),
+                 layers.object.width(),
+                 layers.object.height());
+    const int width = photo.codes.width();
+    const int height = photo.codes.height();
+    const double clip_code = options.clip_fraction * photo.max_code;
+
+    // The photograph's radiance, with the probe's where the photograph only gives a bound.
+    Image<Rgb> radiance = photographedRadiance(photo, response, relative_exposure);
+    std::size_t clipped = 0;
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
+        bool any = false;
+        for (int c = 0; c < 3; ++c) {
+            if (photo.codes.pixels()[i][c] < clip_code) continue;
+            any = true;
+            float& value = radiance.pixels()[i][c];
+            value = std::max(value, layers.probe_radiance.pixels()[i][c]);
+        }
+        clipped += any;
+    }
+    const Image<Rgb> reflectance = reflectanceOverPi(radiance, layers, options);
+
+    Composite composite;
+    composite.image = photo;
+    composite.linear = Image<Rgb>(width, height);
+    composite.influence = Image<std::uint8_t>(width, height);
+    std::atomic<std::size_t> changed{0};
+    std::atomic<std::size_t> changed_clipped{0};
+    parallelFor(0, height, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < width; ++x) {
+            const float uncovered = 1.0f - layers.alpha(x, y);
+            const Rgb change = reflectance(x, y) *
+                               (layers.irradiance_with(x, y) - layers.irradiance_without(x, y));
+            const Rgb before = radiance(x, y);
+            const Rgb after =
+                layers.object(x, y) + uncovered * glm::max(before + change, Rgb(0.0f));
+            composite.linear(x, y) = after;
+
+            glm::u16vec3 codes;
+            bool influenced = layers.alpha(x, y) > 0.0f;
+            bool was_clipped = false;
+            for (int c = 0; c < 3; ++c) {
+                const auto codeOf = [&](float value) {
+                    return response.encode(c, value * relative_exposure) * photo.max_code / 255.0;
+                };
+                const std::uint16_t was = photo.codes(x, y)[c];
+                const double code = codeOf(after[c]);
+                influenced =
+                    influenced || std::abs(code - codeOf(before[c])) >= options.influence_codes;
+                codes[c] = static_cast<std::uint16_t>(std::lround(code));
+                // A clipped channel stays as it came unless the light falls below the clipping.
+                if (was < clip_code) continue;
+                was_clipped = true;
+                if (codes[c] > was) codes[c] = was;
+            }
+            if (!influenced) continue;
+            composite.image.codes(x, y) = codes;
+            composite.influence(x, y) = 1;
+            changed.fetch_add(1);
+            if (was_clipped) changed_clipped.fetch_add(1);
+        }
+    });
+    composite.influence_fraction =
+        static_cast<double>(changed) /
+        std::max<double>(1.0, static_cast<double>(radiance.pixelCount()));
+    if (changed_clipped > 0)
+        composite.findings.push_back(
+            {Severity::Info,
+             "composite-clipped-pixels",
+             fmt::format(
+                 "{:.1f} % of the photograph is clipped; {} pixels the objects affect are "
+                 "among them: there the light probe or the bound stands for the photograph",
+                 100.0 * static_cast<double>(clipped) / static_cast<double>(radiance.pixelCount()),
+                 changed_clipped.load())});
+    return composite;
+}
+
+}  // namespace insitu
