@@ -14,7 +14,9 @@ struct SurfacePoint {
     double distance_m = 0.0;
     glm::dvec3 position{0.0};
     glm::dvec3 geometric_normal{0.0};  ///< unit, on the side the ray came from
-    glm::dvec3 shading_normal{0.0};    ///< unit, same side as the geometric one
+    /// Unit, interpolated, same side as the geometric one. For glossy materials bent, if need be,
+    /// just above the horizon seen from the ray's origin; Lambert needs no bending, and gets none.
+    glm::dvec3 shading_normal{0.0};
     SurfaceMaterial material;
     std::size_t object = 0;
 };
@@ -25,6 +27,8 @@ public:
     struct Object {
         Model model;  ///< mesh already placed in the world
     };
+    /// Models are valid as core/mesh.h says (LogicError otherwise); one without triangles is
+    /// allowed.
     explicit ObjectScene(std::vector<Object> objects);
     ~ObjectScene();
     ObjectScene(ObjectScene&&) noexcept;
@@ -38,7 +42,9 @@ public:
                                                         double max_distance_m = kInfinity) const;
     [[nodiscard]] bool occluded(glm::dvec3 origin,
                                 glm::dvec3 direction,
-                                double max_distance_m) const;
+                                double max_distance_m = kInfinity) const;
+    /// Where a ray in `direction` starts so that it does not hit its own surface again.
+    [[nodiscard]] glm::dvec3 leave(const SurfacePoint& point, glm::dvec3 direction) const;
 
 private:
     struct Impl;

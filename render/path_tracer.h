@@ -39,13 +39,15 @@ struct RenderOptions {
 
 struct RenderedImage {
     Image<Rgb> radiance;
-    /// Variance of the mean's luminance, per pixel.
+    /// Variance of the mean's luminance, per pixel, from the samples; 0 when there is only one.
     Image<float> variance;
     int samples_per_pixel = 0;  ///< reached
+    bool stopped_by_time = false;
 };
 
 /// A complete picture of objects under a light: for simulated captures and tests. Box-filtered
-/// pixels; same bytes for every number of threads.
+/// pixels; same bytes for every number of threads. Where no object is in the way the light itself
+/// is seen. Progress stage "rendering", one report a sample pass; throws CancelledError.
 [[nodiscard]] RenderedImage renderScene(const ObjectScene& objects,
                                         const LightSource& light,
                                         const Camera& camera,

@@ -13,6 +13,7 @@ using RegisterCommand = void (*)(CLI::App&, Context&);
 
 /// Every command, in the order of the help text: the order in which a project uses them.
 constexpr RegisterCommand kCommands[] = {
+    registerInsert,
     registerTonemap,
     registerCompare,
 };

@@ -1,0 +1,93 @@
+#include "apps/cli/command.h"
+#include "core/io/image_io.h"
+#include "pipeline/report.h"
+
+namespace insitu::cli {
+
+namespace {
+
+struct InsertArguments {
+    std::filesystem::path project;
+    std::filesystem::path output;
+    std::filesystem::path hdr;
+    std::filesystem::path layers;
+    std::filesystem::path report;
+    std::string technique = "reference";
+    std::string form = "ratio";
+    bool ignore_exif_focal = false;
+    int bits = 0;
+    InsertOptions options;
+};
+
+void runInsert(InsertArguments& arguments, Context& context)
+{
+    context.start();
+    for (const auto& path : {arguments.output, arguments.hdr, arguments.layers, arguments.report})
+        if (!path.empty()) context.checkOutput(path);
+
+    InsertOptions& options = arguments.options;
+    options.render.seed = context.options.seed;
+    options.light.seed = context.options.seed;
+    options.render.interreflection.seed = context.options.seed;
+    options.render.min_samples = std::min(options.render.min_samples, options.render.max_samples);
+    options.composite.form =
+        arguments.form == "ratio" ? CompositeForm::Ratio : CompositeForm::Difference;
+    options.use_exif_focal = !arguments.ignore_exif_focal;
+
+    const Project project = readProject(arguments.project);
+    const InsertResult result = insertObjects(project, options, context.progress());
+    context.print(result.findings);
+
+    writeEncoded(arguments.output, result.composite.image, result.photo.metadata.exif);
+    if (!arguments.hdr.empty()) writeRadiance(arguments.hdr, result.composite.linear);
+    if (!arguments.layers.empty()) writeLayers(arguments.layers, result);
+    if (!arguments.report.empty())
+        writeReport(arguments.report, project, options, result, arguments.output);
+}
+
+}  // namespace
+
+void registerInsert(CLI::App& app, Context& context)
+{
+    auto arguments = std::make_shared<InsertArguments>();
+    InsertionOptions& render = arguments->options.render;
+    CLI::App* command =
+        app.add_subcommand("insert", "Put furniture into a photograph: the whole chain");
+    command->add_option("project", arguments->project, "Project file (.json)")->required();
+    command->add_option("-o,--output", arguments->output, "Picture to write (.png, .jpg)")
+        ->required();
+    command->add_option("--hdr", arguments->hdr, "Also write the linear composite (.exr, .hdr)");
+    command->add_option("--layers", arguments->layers, "Also write all layers (.exr)");
+    command->add_option("--report", arguments->report, "Also write findings and figures (.json)");
+    command->add_option("--technique", arguments->technique, "How light is computed: reference")
+        ->check(CLI::IsMember({"reference"}))
+        ->capture_default_str();
+    command
+        ->add_option("--max-error",
+                     render.target_error,
+                     "Standard error of the light at which a pixel is done, relative")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    command->add_option("--samples", render.max_samples, "Most samples per pixel")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command
+        ->add_option(
+            "--max-seconds", render.max_seconds, "Stop rendering after this time; 0: no limit")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    command->add_option("--composite", arguments->form, "ratio or difference")
+        ->check(CLI::IsMember({"ratio", "difference"}))
+        ->capture_default_str();
+    command->add_flag(
+        "--ignore-exif-focal", arguments->ignore_exif_focal, "Calibrate from the lines alone");
+    context.addCommonOptions(*command);
+    command->footer(
+        "Examples:\n"
+        "  insitu insert project.json -o final.png\n"
+        "  insitu insert project.json -o final.png --hdr final.exr --report report.json "
+        "--max-error 0.002");
+    command->callback([arguments, &context] { runInsert(*arguments, context); });
+}
+
+}  // namespace insitu::cli

@@ -1,0 +1,102 @@
+#include "capture/bracket.h"
+#include "core/io/image_io.h"
+#include "core/io/json.h"
+#include "pipeline/insert.h"
+
+#include <cmath>
+
+namespace insitu {
+
+namespace {
+
+ResponseCurve readResponse(const std::filesystem::path& path)
+{
+    const Json json = readJson(path);
+    ResponseCurve curve = responseFromJson(JsonNode(json, path.string()));
+    curve.source = path.filename().string();
+    return curve;
+}
+
+EnvironmentMap readEnvironment(const std::filesystem::path& path)
+{
+    EnvironmentMap environment{readRadiance(path).pixels};
+    if (environment.pixels.width() != 2 * environment.pixels.height())
+        throw InputError(path.string(),
+                         fmt::format("is {}x{}; an equirectangular environment is twice as wide as "
+                                     "high",
+                                     environment.pixels.width(),
+                                     environment.pixels.height()));
+    return environment;
+}
+
+/// Brackets of encoded photographs need a response; a single radiance file is linear already.
+Image<Rgb> probeRadiance(const ProjectProbe& probe,
+                         const InsertOptions& options,
+                         CapturedLight& light)
+{
+    if (probe.images.size() == 1 && isRadianceFile(probe.images.front().path)) {
+        light.response = ResponseCurve::srgb();
+        return readRadiance(probe.images.front().path).pixels;
+    }
+    std::vector<std::filesystem::path> files;
+    std::vector<Exposure> exposures;
+    for (const ProjectImage& image : probe.images) {
+        files.push_back(image.path);
+        exposures.push_back(image.exposure);
+    }
+    const Bracket bracket = readBracket(files, exposures);
+    append(light.findings, bracket.findings);
+    light.metadata = bracket.metadata;
+    light.radiance_unit_known = true;
+    if (probe.response) {
+        light.response = readResponse(*probe.response);
+        light.response_known = true;
+    } else {
+        const ResponseRecovery recovery = recoverResponse(bracket, options.response);
+        append(light.findings, recovery.findings);
+        light.response = recovery.curve;
+        light.response_known = !hasFinding(recovery.findings, "response-not-recoverable");
+    }
+    MergeResult merged = mergeBracket(bracket, light.response, options.merge);
+    append(light.findings, merged.findings);
+    return std::move(merged.radiance.pixels);
+}
+
+}  // namespace
+
+CapturedLight captureLight(const Project& project,
+                           const SceneProxy& proxy,
+                           const Camera& photo_camera,
+                           const InsertOptions& options)
+{
+    CapturedLight light;
+    if (project.light.environment) {
+        light.environment = readEnvironment(*project.light.environment);
+        light.center_m = project.light.center_m;
+        return light;
+    }
+    const ProjectProbe& probe = *project.light.probe;
+    light.center_m = probe.center_m;
+    const Image<Rgb> radiance = probeRadiance(probe, options, light);
+    if (probe.kind == ProbeKind::LatLong) {
+        light.environment.pixels = radiance;
+        return light;
+    }
+
+    UnwrapOptions unwrap;
+    unwrap.crop_origin_px = probe.crop_origin_px;
+    unwrap.distance_to_room = [&](glm::dvec3 origin, glm::dvec3 direction) {
+        const auto hit = proxy.intersect(origin, direction);
+        return hit && !hit->opening ? hit->distance_m : kInfinity;
+    };
+    const Camera camera =
+        probe.view_position_m
+            ? ballCamera(probe.ball, *probe.view_position_m, radiance.width(), radiance.height())
+            : photo_camera;
+    LightProbe unwrapped = unwrapMirrorBall(radiance, probe.ball, camera, unwrap);
+    append(light.findings, unwrapped.findings);
+    light.environment = std::move(unwrapped.environment);
+    return light;
+}
+
+}  // namespace insitu

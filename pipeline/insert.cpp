@@ -1,0 +1,257 @@
+#include "pipeline/insert.h"
+
+#include "core/color.h"
+#include "core/io/image_io.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace insitu {
+
+namespace {
+
+/// Adds the seconds since the last call to the list, under the stage's name.
+class Stopwatch {
+public:
+    explicit Stopwatch(std::vector<StageTime>& times) : times_(times) {}
+    void lap(const char* stage)
+    {
+        const auto now = std::chrono::steady_clock::now();
+        times_.push_back({stage, std::chrono::duration<double>(now - last_).count()});
+        last_ = now;
+    }
+
+private:
+    std::vector<StageTime>& times_;
+    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+Exposure merged(Exposure exif, const Exposure& given)
+{
+    if (given.seconds) exif.seconds = given.seconds;
+    if (given.f_number) exif.f_number = given.f_number;
+    if (given.iso) exif.iso = given.iso;
+    return exif;
+}
+
+/// The sRGB curve with the free scale of recovered ones: exposure 1 at code 128.
+ResponseCurve srgbAtMiddle()
+{
+    ResponseCurve curve = ResponseCurve::srgb();
+    for (auto& table : curve.exposure) {
+        const double middle = table[128];
+        for (double& value : table)
+            value /= middle;
+    }
+    return curve;
+}
+
+/// The photograph is a single exposure: its response is the probe's when one camera took both.
+void choosePhotoResponse(const Project& project, InsertResult& result)
+{
+    const PhotoMetadata& photo = result.photo.metadata;
+    const PhotoMetadata& probe = result.light.metadata;
+    const Exposure exposure = merged(photo.exposure, project.photo.exposure);
+    const bool same_camera = photo.make == probe.make && photo.model == probe.model;
+    if (result.light.response_known && same_camera) {
+        result.photo_response = result.light.response;
+    } else {
+        result.photo_response = srgbAtMiddle();
+        result.findings.push_back(
+            {Severity::Warning,
+             "photo-response-assumed-srgb",
+             result.light.response_known
+                 ? fmt::format("the photograph is from '{} {}', the light probe from '{} {}': the "
+                               "photograph's response is assumed to be sRGB",
+                               photo.make,
+                               photo.model,
+                               probe.make,
+                               probe.model)
+                 : std::string("no response was recovered for the photograph's camera: it is "
+                               "assumed to be sRGB")});
+    }
+    const auto relative = exposure.relative();
+    if (!relative && result.light.radiance_unit_known)
+        throw InputError(project.photo.path.string(),
+                         "no exposure time in EXIF; add \"exposure_seconds\" beside \"image\" in "
+                         "the project file");
+    result.photo_relative_exposure = relative.value_or(1.0);
+}
+
+/// Compares probe and photograph on the surfaces that both see; brings the layers to the
+/// photograph's unit where exposures could not.
+void matchLightToPhoto(const Image<Rgb>& photo, bool unit_known, InsertResult& result)
+{
+    RenderLayers& layers = result.render.layers;
+    std::vector<double> ratios;
+    const double clip =
+        0.95 * result.photo_response.exposure[1][255] / result.photo_relative_exposure;
+    for (std::size_t i = 0; i < photo.pixelCount(); ++i) {
+        const Rgb seen = layers.probe_radiance.pixels()[i];
+        const Rgb taken = photo.pixels()[i];
+        const float brightest = std::max({taken.r, taken.g, taken.b});
+        if (luminance(seen) > 0.0f && brightest < clip && brightest > 0.02 * clip)
+            ratios.push_back(std::log(luminance(seen) / luminance(taken)));
+    }
+    if (ratios.size() < 100) return;
+    const auto quantile = [&](double q) {
+        const auto at = ratios.begin() + static_cast<std::ptrdiff_t>(q * double(ratios.size() - 1));
+        std::nth_element(ratios.begin(), at, ratios.end());
+        return *at;
+    };
+    result.light_to_photo = std::exp(quantile(0.5));
+    result.light_to_photo_spread = 0.5 * (quantile(0.75) - quantile(0.25));
+    if (unit_known) {
+        if (std::abs(std::log(result.light_to_photo)) > std::log(1.25))
+            result.findings.push_back(
+                {Severity::Warning,
+                 "light-photo-mismatch",
+                 fmt::format(
+                     "surfaces seen by both are {:.2f} times as bright in the light probe as "
+                     "in the photograph (spread {:.0f} %): check the exposures, the ball's "
+                     "reflectance and the room's dimensions",
+                     result.light_to_photo,
+                     100.0 * result.light_to_photo_spread)});
+        return;
+    }
+    const float scale = static_cast<float>(1.0 / result.light_to_photo);
+    for (auto* image : {&layers.object,
+                        &layers.irradiance_with,
+                        &layers.irradiance_without,
+                        &layers.probe_radiance})
+        for (Rgb& value : image->pixels())
+            value *= scale;
+    for (float& value : layers.object_variance.pixels())
+        value *= scale * scale;
+    result.findings.push_back(
+        {Severity::Info,
+         "light-scale-from-photograph",
+         fmt::format("the light's exposure is unknown; scaled by {:.4g} so that surfaces seen by "
+                     "both agree (spread {:.0f} %)",
+                     1.0 / result.light_to_photo,
+                     100.0 * result.light_to_photo_spread)});
+}
+
+/// Objects into the world; an object no light of the room can reach is a mistake.
+ObjectScene placeObjects(const Project& project, const SceneProxy& proxy, InsertResult& result)
+{
+    std::vector<ObjectScene::Object> objects;
+    for (const ProjectObject& wanted : project.objects) {
+        ObjectScene::Object object{loadPlaced(wanted)};
+        append(result.findings, object.model.findings);
+        const BoundingBox box = boundingBox(object.model.mesh);
+        const double extent = glm::length(box.max - box.min);
+        if (extent < 1e-3 || extent > 50.0)
+            result.findings.push_back(
+                {Severity::Warning,
+                 "object-extent-implausible",
+                 fmt::format(
+                     "{} is {:.4g} m across; is its \"scale\" right (0.01 for centimetres)?",
+                     wanted.model.string(),
+                     extent)});
+        for (const RoomBox& room : project.room.boxes) {
+            const double slack = 0.005;
+            if (!room.solid && (glm::any(glm::lessThan(box.min, room.min_m - slack)) ||
+                                glm::any(glm::greaterThan(box.max, room.max_m + slack))))
+                result.findings.push_back(
+                    {Severity::Warning,
+                     "object-outside-room",
+                     fmt::format("{} reaches out of the room's box", wanted.model.string())});
+        }
+        objects.push_back(std::move(object));
+    }
+    (void)proxy;
+    return ObjectScene(std::move(objects));
+}
+
+glm::dvec3 objectsCenter(const ObjectScene& objects)
+{
+    glm::dvec3 sum(0.0);
+    for (const BoundingBox& box : objects.bounds())
+        sum += 0.5 * (box.min + box.max);
+    return sum / std::max<double>(1.0, static_cast<double>(objects.bounds().size()));
+}
+
+}  // namespace
+
+CameraEstimate solveCamera(const Project& project, const Photo& photo, bool use_exif_focal)
+{
+    const int width = photo.image.codes.width();
+    const int height = photo.image.codes.height();
+    const std::filesystem::path source =
+        project.camera_lines ? *project.camera_lines : *project.camera_file;
+    const auto demandSize = [&](int w, int h) {
+        if (w != width || h != height)
+            throw InputError(source.string(),
+                             fmt::format("is for a picture of {}x{}, {} is {}x{}",
+                                         w,
+                                         h,
+                                         project.photo.path.filename().string(),
+                                         width,
+                                         height));
+    };
+    if (project.camera_file) {
+        CameraEstimate estimate = readCamera(source);
+        demandSize(estimate.camera.width, estimate.camera.height);
+        return estimate;
+    }
+    const LineSet lines = readLineSet(source);
+    demandSize(lines.width, lines.height);
+    CalibrationOptions options;
+    options.use_exif = use_exif_focal;
+    options.exif_focal_px = photo.metadata.focal_px;
+    return calibrateCamera(lines, options, source.string());
+}
+
+InsertResult insertObjects(const Project& project, const InsertOptions& options, Progress& progress)
+{
+    InsertResult result;
+    Stopwatch watch(result.times);
+    result.photo = readPhoto(project.photo.path);
+    result.camera = solveCamera(project, result.photo, options.use_exif_focal);
+    append(result.findings, result.camera.findings);
+    const Camera& camera = result.camera.camera;
+    watch.lap("camera");
+
+    const SceneProxy proxy(project.room);
+    append(result.findings, proxy.findings());
+    result.light = captureLight(project, proxy, camera, options);
+    append(result.findings, result.light.findings);
+    choosePhotoResponse(project, result);
+    watch.lap("probe");
+
+    const ObjectScene objects = placeObjects(project, proxy, result);
+    watch.lap("models");
+
+    // The photograph stands in for surfaces the probe did not see, where both share a unit.
+    const Image<Rgb> photo_radiance = photographedRadiance(
+        result.photo.image, result.photo_response, result.photo_relative_exposure);
+    std::optional<PhotographedRadiance> photographed;
+    if (result.light.radiance_unit_known) photographed = {camera, photo_radiance};
+    RoomLightOptions light_options = options.light;
+    light_options.reference_point_m = objectsCenter(objects);
+    const RoomLight room(proxy,
+                         result.light.environment,
+                         result.light.center_m,
+                         photographed,
+                         light_options,
+                         progress);
+    append(result.findings, room.findings());
+    watch.lap("room light");
+
+    result.render = renderInsertion(camera, room, objects, options.render, progress);
+    matchLightToPhoto(photo_radiance, result.light.radiance_unit_known, result);
+    watch.lap("render");
+
+    result.composite = compositeDifferential(result.photo.image,
+                                             result.photo_response,
+                                             result.photo_relative_exposure,
+                                             result.render.layers,
+                                             options.composite);
+    append(result.findings, result.composite.findings);
+    watch.lap("composite");
+    return result;
+}
+
+}  // namespace insitu

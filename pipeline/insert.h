@@ -1,0 +1,74 @@
+#pragma once
+
+#include "capture/hdr_merge.h"
+#include "capture/response_recovery.h"
+#include "composite/differential.h"
+#include "core/environment_map.h"
+#include "core/progress.h"
+#include "pipeline/project.h"
+#include "render/renderer.h"
+
+#include <string>
+#include <vector>
+
+namespace insitu {
+
+struct InsertOptions {
+    ResponseOptions response;
+    MergeOptions merge;
+    RoomLightOptions light;
+    InsertionOptions render;
+    CompositeOptions composite;
+    /// Take the focal length in EXIF into account.
+    bool use_exif_focal = true;
+};
+
+/// Seconds one stage took.
+struct StageTime {
+    std::string stage;
+    double seconds = 0.0;
+};
+
+/// The light of a project: an environment seen from a place in the room.
+struct CapturedLight {
+    EnvironmentMap environment;
+    glm::dvec3 center_m{0.0};
+    ResponseCurve response;            ///< of the camera that took the probe
+    bool response_known = false;       ///< recovered or given, not assumed
+    bool radiance_unit_known = false;  ///< exposures are known, so that photographs compare
+    PhotoMetadata metadata;
+    Findings findings;
+};
+
+struct InsertResult {
+    Photo photo;
+    ResponseCurve photo_response;
+    double photo_relative_exposure = 1.0;
+    CameraEstimate camera;
+    CapturedLight light;
+    InsertionResult render;
+    Composite composite;
+    /// Median over surfaces that both see of probe radiance / photographed radiance (luminance),
+    /// and half the interquartile range of its natural logarithm. 0 when they share no pixel.
+    double light_to_photo = 0.0;
+    double light_to_photo_spread = 0.0;
+    Findings findings;  ///< of all stages, in order
+    std::vector<StageTime> times;
+};
+
+/// The camera of the project: from its lines or its file; InputError when the size is not the
+/// photo's.
+[[nodiscard]] CameraEstimate solveCamera(const Project& project,
+                                         const Photo& photo,
+                                         bool use_exif_focal);
+/// Brackets → response → radiance → environment at the probe's centre (or the environment file).
+[[nodiscard]] CapturedLight captureLight(const Project& project,
+                                         const SceneProxy& proxy,
+                                         const Camera& photo_camera,
+                                         const InsertOptions& options);
+/// The whole main job, in memory. InputError and NoAnswerError as the stages throw them.
+[[nodiscard]] InsertResult insertObjects(const Project& project,
+                                         const InsertOptions& options,
+                                         Progress& progress);
+
+}  // namespace insitu

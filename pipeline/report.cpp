@@ -1,0 +1,112 @@
+#include "pipeline/report.h"
+
+#include "core/io/image_io.h"
+#include "core/io/json.h"
+
+#include <numbers>
+
+namespace insitu {
+
+namespace {
+
+Json vectorJson(glm::dvec3 v)
+{
+    return Json::array({v.x, v.y, v.z});
+}
+
+Json findingsJson(const Findings& findings)
+{
+    Json list = Json::array();
+    for (const Finding& finding : findings)
+        list.push_back({{"severity", severityName(finding.severity)},
+                        {"code", finding.code},
+                        {"message", finding.message}});
+    return list;
+}
+
+Json cameraJson(const CameraEstimate& estimate)
+{
+    const Camera& camera = estimate.camera;
+    return {{"focal_px", Json::array({camera.focal_px.x, camera.focal_px.y})},
+            {"focal_px_sigma", estimate.focal_sigma_px},
+            {"position_m", vectorJson(camera.position_m)},
+            {"position_m_sigma", vectorJson(estimate.position_sigma_m)},
+            {"rotation_deg_sigma", estimate.rotation_sigma_rad * 180.0 / std::numbers::pi},
+            {"residual_rms_px", estimate.residual_rms_px}};
+}
+
+void addColor(const std::string& name, const Image<Rgb>& image, std::vector<ExrChannel>& channels)
+{
+    static constexpr const char* kNames[] = {"R", "G", "B"};
+    for (int c = 0; c < 3; ++c) {
+        Image<float> plane(image.width(), image.height());
+        for (std::size_t i = 0; i < image.pixelCount(); ++i)
+            plane.pixels()[i] = image.pixels()[i][c];
+        channels.push_back({name + "." + kNames[c], std::move(plane)});
+    }
+}
+
+}  // namespace
+
+void writeReport(const std::filesystem::path& path,
+                 const Project& project,
+                 const InsertOptions& options,
+                 const InsertResult& result,
+                 const std::filesystem::path& picture)
+{
+    Json times = Json::object();
+    for (const StageTime& time : result.times)
+        times[time.stage] = time.seconds;
+    const double half_code = options.composite.influence_codes;
+    const Json report = {
+        {"format", "insitu-report"},
+        {"version", 1},
+        {"project", project.file.string()},
+        {"picture", picture.string()},
+        {"camera", cameraJson(result.camera)},
+        {"light",
+         {{"center_m", vectorJson(result.light.center_m)},
+          {"environment_px",
+           Json::array({result.light.environment.pixels.width(),
+                        result.light.environment.pixels.height()})},
+          {"response", result.light.response.source},
+          {"photo_response", result.photo_response.source},
+          {"photo_relative_exposure", result.photo_relative_exposure},
+          {"light_to_photo", result.light_to_photo},
+          {"light_to_photo_spread", result.light_to_photo_spread}}},
+        {"render",
+         {{"technique", "reference"},
+          {"seed", options.render.seed},
+          {"max_samples", options.render.max_samples},
+          {"mean_samples", result.render.mean_samples},
+          {"stopped_by_time", result.render.stopped_by_time},
+          {"ratio_standard_error", result.render.ratio_error}}},
+        {"composite",
+         {{"form", options.composite.form == CompositeForm::Ratio ? "ratio" : "difference"},
+          {"influence_codes", half_code},
+          {"influence_fraction", result.composite.influence_fraction}}},
+        {"findings", findingsJson(result.findings)},
+        {"seconds", times}};
+    writeJson(path, report);
+}
+
+void writeLayers(const std::filesystem::path& path, const InsertResult& result)
+{
+    const RenderLayers& layers = result.render.layers;
+    std::vector<ExrChannel> channels;
+    addColor("beauty", result.composite.linear, channels);
+    addColor("object", layers.object, channels);
+    addColor("irradiance.with", layers.irradiance_with, channels);
+    addColor("irradiance.without", layers.irradiance_without, channels);
+    channels.push_back({"object.A", layers.alpha});
+    channels.push_back({"depth.Z", layers.depth_m});
+    channels.push_back({"variance.object.Y", layers.object_variance});
+    channels.push_back({"variance.ratio.Y", layers.ratio_variance});
+    Image<float> influence(layers.alpha.width(), layers.alpha.height());
+    for (std::size_t i = 0; i < influence.pixelCount(); ++i)
+        influence.pixels()[i] = result.composite.influence.pixels()[i];
+    channels.push_back({"influence.Y", std::move(influence)});
+    writeLayeredExr(path, channels);
+}
+
+}  // namespace insitu

@@ -1,0 +1,219 @@
+#include "core/color.h"
+#include "core/parallel.h"
+#include "render/renderer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+namespace insitu {
+
+namespace {
+
+/// Samples between two looks at a pixel's error.
+constexpr int kBatch = 8;
+
+/// Sums of one pixel's samples.
+struct PixelSums {
+    int count = 0;
+    int covered = 0;
+    glm::dvec3 object{0.0};
+    double object_square = 0.0;  ///< of luminance
+    double depth = kInfinity;
+    int receivers = 0;
+    glm::dvec3 without{0.0};
+    glm::dvec3 with{0.0};
+    double change = 0.0;  ///< luminance of with − without
+    double change_square = 0.0;
+    glm::dvec3 probe{0.0};
+    int probe_count = 0;
+
+    /// Variance of the mean of the object's luminance.
+    [[nodiscard]] double objectVariance() const
+    {
+        if (count < 2) return 0.0;
+        const double mean = static_cast<double>(luminance(Rgb(object))) / count;
+        return std::max(0.0, object_square / count - mean * mean) / (count - 1);
+    }
+    /// Variance of the mean change over the mean irradiance.
+    [[nodiscard]] double ratioVariance() const
+    {
+        const double base = luminance(Rgb(without));
+        if (receivers < 2 || !(base > 0.0)) return 0.0;
+        const double mean = change / receivers;
+        const double variance =
+            std::max(0.0, change_square / receivers - mean * mean) / (receivers - 1);
+        const double mean_base = base / receivers;
+        return variance / (mean_base * mean_base);
+    }
+    [[nodiscard]] bool quiet(double target) const
+    {
+        const double object_mean = static_cast<double>(luminance(Rgb(object))) / count;
+        const double scale = std::max(object_mean, 1e-12);
+        return ratioVariance() <= target * target &&
+               objectVariance() <= 4.0 * target * target * scale * scale;
+    }
+};
+
+class PixelSampler {
+public:
+    PixelSampler(const Camera& camera,
+                 const RoomWithObjects& scene,
+                 const InsertionOptions& options)
+        : camera_(camera), scene_(scene), options_(options)
+    {
+    }
+
+    void add(int x, int y, PixelSums& sums) const
+    {
+        const std::uint64_t pixel = static_cast<std::uint64_t>(y) * camera_.width + x;
+        RandomStream random(options_.seed, pixel, static_cast<std::uint64_t>(sums.count));
+        const glm::vec2 jitter = random.uniform2();
+        const glm::dvec3 direction = camera_.rayDirection(
+            {x + static_cast<double>(jitter.x), y + static_cast<double>(jitter.y)});
+        const auto surface = scene_.room().proxy().intersect(camera_.position_m, direction);
+        const auto point = scene_.objects().intersect(
+            camera_.position_m, direction, surface ? surface->distance_m : kInfinity);
+        ++sums.count;
+        if (point) {
+            const glm::dvec3 radiance(
+                tracePath(scene_.objects(), scene_, *point, -direction, options_.path, random));
+            const double value = luminance(Rgb(radiance));
+            sums.object += radiance;
+            sums.object_square += value * value;
+            sums.depth = std::min(sums.depth, point->distance_m);
+            ++sums.covered;
+            return;
+        }
+        if (!surface || surface->opening) return;
+        const ReceiverSample drawn =
+            scene_.sampleReceiver(surface->point, surface->normal, options_.path, random);
+        const double change = luminance(Rgb(drawn.with - drawn.without));
+        sums.without += drawn.without;
+        sums.with += drawn.with;
+        sums.change += change;
+        sums.change_square += change * change;
+        ++sums.receivers;
+        const Rgb probe = scene_.room().probeRadiance(surface->face, surface->uv);
+        if (probe != Rgb(0.0f)) {
+            sums.probe += glm::dvec3(probe);
+            ++sums.probe_count;
+        }
+    }
+
+private:
+    const Camera& camera_;
+    const RoomWithObjects& scene_;
+    const InsertionOptions& options_;
+};
+
+RenderLayers emptyLayers(int width, int height)
+{
+    RenderLayers layers;
+    layers.object = layers.irradiance_without = layers.irradiance_with = layers.probe_radiance =
+        Image<Rgb>(width, height);
+    layers.alpha = layers.depth_m = layers.object_variance = layers.ratio_variance =
+        Image<float>(width, height);
+    return layers;
+}
+
+void store(const PixelSums& sums, int x, int y, RenderLayers& layers)
+{
+    layers.object(x, y) = Rgb(sums.object / static_cast<double>(sums.count));
+    layers.alpha(x, y) = static_cast<float>(sums.covered) / static_cast<float>(sums.count);
+    layers.depth_m(x, y) = sums.covered > 0 ? static_cast<float>(sums.depth) : 0.0f;
+    layers.object_variance(x, y) = static_cast<float>(sums.objectVariance());
+    layers.ratio_variance(x, y) = static_cast<float>(sums.ratioVariance());
+    if (sums.receivers > 0) {
+        layers.irradiance_without(x, y) = Rgb(sums.without / static_cast<double>(sums.receivers));
+        layers.irradiance_with(x, y) = Rgb(sums.with / static_cast<double>(sums.receivers));
+    }
+    if (sums.probe_count > 0)
+        layers.probe_radiance(x, y) = Rgb(sums.probe / static_cast<double>(sums.probe_count));
+}
+
+}  // namespace
+
+Findings InsertionOptions::validate() const
+{
+    Findings findings;
+    const auto demand = [&](bool holds, const char* message) {
+        if (!holds) findings.push_back({Severity::Error, "option-out-of-range", message});
+    };
+    demand(max_samples > 0, "max_samples must be > 0");
+    demand(min_samples > 0 && min_samples <= max_samples,
+           "min_samples must be in [1, max_samples]");
+    demand(target_error >= 0.0, "target_error must be >= 0");
+    demand(max_seconds >= 0.0, "max_seconds must be >= 0");
+    return findings;
+}
+
+InsertionResult renderInsertion(const Camera& camera,
+                                const RoomLight& room,
+                                const ObjectScene& objects,
+                                const InsertionOptions& options,
+                                Progress& progress)
+{
+    using Clock = std::chrono::steady_clock;
+    const auto start = Clock::now();
+    const auto outOfTime = [&] {
+        return options.max_seconds > 0.0 &&
+               std::chrono::duration<double>(Clock::now() - start).count() > options.max_seconds;
+    };
+    const RoomWithObjects scene(room, objects, options.interreflection, progress);
+    const PixelSampler sampler(camera, scene, options);
+
+    // All pixels take their fewest samples, then those that are still noisy go on, pass by pass:
+    // a time limit then stops with an even picture.
+    const int width = camera.width;
+    const int height = camera.height;
+    std::vector<PixelSums> sums(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    InsertionResult result;
+    int reached = 0;
+    while (reached < options.max_samples) {
+        const int goal = std::min(
+            options.max_samples,
+            reached == 0 ? options.min_samples : std::max(reached + kBatch, reached * 5 / 4));
+        std::atomic<int> rows_done{0};
+        parallelFor(0, height, [&](std::int64_t y) {
+            if (progress.cancelled()) return;
+            for (int x = 0; x < width; ++x) {
+                PixelSums& pixel = sums[static_cast<std::size_t>(y * width + x)];
+                if (reached > 0 && (pixel.count < reached || pixel.quiet(options.target_error)))
+                    continue;
+                while (pixel.count < goal)
+                    sampler.add(x, static_cast<int>(y), pixel);
+            }
+            rows_done.fetch_add(1);
+        });
+        progress.checkpoint();
+        reached = goal;
+        progress.report("render", static_cast<double>(reached) / options.max_samples);
+        if (outOfTime()) {
+            result.stopped_by_time = reached < options.max_samples;
+            break;
+        }
+    }
+
+    result.layers = emptyLayers(width, height);
+    double samples = 0.0;
+    double variance = 0.0;
+    double receivers = 0.0;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const PixelSums& pixel = sums[static_cast<std::size_t>(y) * width + x];
+            store(pixel, x, y, result.layers);
+            samples += pixel.count;
+            if (pixel.receivers == 0) continue;
+            variance += pixel.ratioVariance();
+            receivers += 1.0;
+        }
+    }
+    result.mean_samples = samples / (static_cast<double>(width) * height);
+    result.ratio_error = receivers > 0.0 ? std::sqrt(variance / receivers) : 0.0;
+    return result;
+}
+
+}  // namespace insitu
