@@ -1,6 +1,8 @@
 #include "core/io/model_io.h"
 
 #include "core/check.h"
+#include "core/io/assimp_reader.h"
+#include "core/io/gltf_reader.h"
 #include "core/io/obj_reader.h"
 
 #include <algorithm>
@@ -24,7 +26,12 @@ Model readByExtension(const std::filesystem::path& path)
 {
     const std::string extension = lowerExtension(path);
     if (extension == ".obj") return readObj(path);
-    throw InputError(path.string(), fmt::format("'{}' is no model format that is read", extension));
+    if (extension == ".gltf" || extension == ".glb") return readGltf(path);
+    if (isAssimpFormat(extension)) return readWithAssimp(path);
+    throw InputError(path.string(),
+                     fmt::format("'{}' is no model format that is read; use .gltf, .glb, .obj, "
+                                 ".ply, .stl, .dae or .fbx",
+                                 extension));
 }
 
 }  // namespace

@@ -96,6 +96,31 @@ Image<glm::u8vec4> decodeTexture(std::span<const std::uint8_t> bytes, const std:
     return image;
 }
 
+int addTexture(Model& model,
+               std::span<const std::uint8_t> bytes,
+               const std::string& name,
+               bool srgb)
+{
+    Texture texture;
+    try {
+        texture.texels = decodeTexture(bytes, name);
+    } catch (const InputError& cause) {
+        model.findings.push_back({Severity::Warning,
+                                  "model-texture-unreadable",
+                                  fmt::format("{}; the plain colour is used", cause.what())});
+        return kNoTexture;
+    }
+    texture.srgb = srgb;
+    std::size_t texels = texture.texels.pixelCount();
+    for (const Texture& other : model.textures)
+        texels += other.texels.pixelCount();
+    if (texels > static_cast<std::size_t>(kMaxTexturePixels))
+        throw InputError(
+            name, fmt::format("the model's textures exceed {} texels in all", kMaxTexturePixels));
+    model.textures.push_back(std::move(texture));
+    return static_cast<int>(model.textures.size()) - 1;
+}
+
 int addTextureFile(Model& model, const fs::path& model_path, std::string_view name, bool srgb)
 {
     const fs::path file = resourceBeside(model_path, name);
@@ -109,18 +134,7 @@ int addTextureFile(Model& model, const fs::path& model_path, std::string_view na
                                               file.string())});
         return kNoTexture;
     }
-    try {
-        Texture texture;
-        texture.texels = decodeTexture(readFile(file, kMaxModelBytes), file.string());
-        texture.srgb = srgb;
-        model.textures.push_back(std::move(texture));
-    } catch (const InputError& cause) {
-        model.findings.push_back({Severity::Warning,
-                                  "model-texture-unreadable",
-                                  fmt::format("{}; the plain colour is used", cause.what())});
-        return kNoTexture;
-    }
-    return static_cast<int>(model.textures.size()) - 1;
+    return addTexture(model, readFile(file, kMaxModelBytes), file.string(), srgb);
 }
 
 }  // namespace insitu

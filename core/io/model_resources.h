@@ -32,6 +32,14 @@ inline constexpr std::int64_t kMaxTexturePixels = 1LL << 27;
 [[nodiscard]] Image<glm::u8vec4> decodeTexture(std::span<const std::uint8_t> bytes,
                                                const std::string& name);
 
+/// Decodes an image that a model holds and appends it to `model.textures`; its index, or kNoTexture
+/// with finding "model-texture-unreadable". All textures of a model together hold at most
+/// kMaxTexturePixels, else InputError.
+[[nodiscard]] int addTexture(Model& model,
+                             std::span<const std::uint8_t> bytes,
+                             const std::string& name,
+                             bool srgb);
+
 /// Reads a texture named by a model and appends it to `model.textures`; its index, or kNoTexture
 /// with finding "model-texture-missing" or "model-texture-unreadable" when it cannot be used.
 /// A name that leaves the folder is an InputError (see resourceBeside).
