@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <ostream>
 
 namespace insitu::cli {
@@ -49,7 +50,7 @@ void TerminalProgress::startStage(std::string_view stage)
     clear();
     stage_ = stage;
     stage_start_ = seconds_();
-    last_drawn_ = stage_start_ - kRedrawSeconds;
+    last_drawn_ = -std::numeric_limits<double>::infinity();
     last_tenth_ = 0;
 }
 

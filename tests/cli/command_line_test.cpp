@@ -1,0 +1,242 @@
+#include "apps/cli/command.h"
+#include "core/io/image_io.h"
+#include "core/io/json.h"
+#include "tests/cli/run_program.h"
+#include "tests/support/tolerance.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+namespace insitu::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+using testing::UnorderedElementsAre;
+
+const std::vector<std::string> kCommands = {INSITU_COMMANDS};
+
+void writeText(const std::filesystem::path& path, const std::string& text)
+{
+    std::ofstream(path) << text;
+}
+
+std::string textOf(const std::filesystem::path& path)
+{
+    std::ifstream stream(path);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+}
+
+EncodedImage grey(int width, int height, std::uint16_t code)
+{
+    return {Image<glm::u16vec3>(width, height, glm::u16vec3(code)), 255};
+}
+
+TEST(CommandLine, HelpNamesEveryCommandAndIsNoFailure)
+{
+    const ProgramRun run = runProgram({"--help"});
+    EXPECT_EQ(run.exit_code, kDone);
+    EXPECT_EQ(run.messages, "");
+    for (const std::string& command : kCommands)
+        EXPECT_THAT(run.output, HasSubstr("\n  " + command)) << command;
+}
+
+TEST(CommandLine, EveryCommandHasHelpWithExamples)
+{
+    for (const std::string& command : kCommands) {
+        const ProgramRun run = runProgram({command, "--help"});
+        EXPECT_EQ(run.exit_code, kDone) << command;
+        EXPECT_THAT(run.output, HasSubstr("insitu " + command + " ")) << command;
+        EXPECT_THAT(run.output, HasSubstr("xample")) << command;
+        EXPECT_THAT(run.output, HasSubstr("--strict")) << command;
+    }
+}
+
+TEST(CommandLine, VersionNamesCompilerAndLibraries)
+{
+    const ProgramRun run = runProgram({"--version"});
+    EXPECT_EQ(run.exit_code, kDone);
+    EXPECT_THAT(run.output, testing::MatchesRegex("insitu [0-9]+\\.[0-9]+\\.[0-9]+\n(.|\n)*"));
+    for (const char* name : {"OpenCV 4", "OpenEXR 3", "Ceres 2", "Embree 3", "GNU"})
+        EXPECT_THAT(run.output, HasSubstr(name));
+}
+
+TEST(CommandLine, WrongUsageIsTwo)
+{
+    EXPECT_EQ(runProgram({}).exit_code, kWrongUsage);
+    EXPECT_EQ(runProgram({"paint"}).exit_code, kWrongUsage);
+    EXPECT_EQ(runProgram({"tonemap"}).exit_code, kWrongUsage);
+    EXPECT_EQ(runProgram({"tonemap", "a.exr", "-o", "b.png", "--keys", "1"}).exit_code,
+              kWrongUsage);
+    EXPECT_EQ(runProgram({"tonemap", "a.exr", "-o", "b.png", "--key", "grey"}).exit_code,
+              kWrongUsage);
+    EXPECT_EQ(runProgram({"tonemap", "a.exr", "-o", "b.png", "--operator", "magic"}).exit_code,
+              kWrongUsage);
+    for (const std::string& command : kCommands) {
+        const ProgramRun run = runProgram({command, "--no-such-flag"});
+        EXPECT_EQ(run.exit_code, kWrongUsage) << command;
+        EXPECT_THAT(run.messages, Not(testing::IsEmpty())) << command;
+        EXPECT_EQ(run.output, "") << command;
+    }
+}
+
+TEST(CommandLine, MissingFileIsOneAndNamed)
+{
+    const ScratchFolder folder;
+    const ProgramRun run =
+        runProgram({"tonemap", (folder / "no.exr").string(), "-o", (folder / "out.png").string()});
+    EXPECT_EQ(run.exit_code, kFailed);
+    EXPECT_THAT(run.messages, HasSubstr("no.exr: no such file"));
+    EXPECT_THAT(folder.names(), ElementsAre());
+}
+
+TEST(CommandLine, FullDeviceIsAFailure)
+{
+    const ScratchFolder folder;
+    writeEncoded(folder / "a.png", grey(4, 4, 100));
+    const std::string picture = (folder / "a.png").string();
+    const std::string command =
+        "'" INSITU_PROGRAM "' compare '" + picture + "' '" + picture + "' >/dev/full 2>&1";
+    EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), kFailed);
+}
+
+TEST(Tonemap, MakesAPictureAndOverwritesOnlyWhenForced)
+{
+    const ScratchFolder folder;
+    writeRadiance(folder / "in.exr", Image<Rgb>(6, 5, Rgb(3.0f)));
+    const std::vector<std::string> arguments = {"tonemap",
+                                                (folder / "in.exr").string(),
+                                                "-o",
+                                                (folder / "out.png").string(),
+                                                "--white",
+                                                "1e9"};
+    EXPECT_EQ(runProgram(arguments).exit_code, kDone);
+    // Key 0.18: 0.18 / 1.18 = 0.1525, sRGB code 109.
+    EXPECT_EQ(readPhoto(folder / "out.png").image.codes(2, 2), glm::u16vec3(109));
+
+    writeText(folder / "out.png", "mine");
+    const ProgramRun refused = runProgram(arguments);
+    EXPECT_EQ(refused.exit_code, kFailed);
+    EXPECT_THAT(refused.messages, HasSubstr("--force"));
+    EXPECT_EQ(textOf(folder / "out.png"), "mine");
+
+    std::vector<std::string> forced = arguments;
+    forced.push_back("--force");
+    EXPECT_EQ(runProgram(forced).exit_code, kDone);
+    EXPECT_EQ(readPhoto(folder / "out.png").image.codes(2, 2), glm::u16vec3(109));
+    EXPECT_THAT(folder.names(), UnorderedElementsAre("in.exr", "out.png"));
+}
+
+// A run that fails late must leave neither a half picture nor a temporary file, and an older
+// picture as it was.
+TEST(Tonemap, FailedRunLeavesNothingBehind)
+{
+    const ScratchFolder folder;
+    writeRadiance(folder / "in.exr", Image<Rgb>(6, 5, Rgb(3.0f)));
+    const std::string good = textOf(folder / "in.exr");
+    writeText(folder / "broken.exr", good.substr(0, good.size() / 2));
+    writeText(folder / "out.png", "mine");
+    const ProgramRun run = runProgram({"tonemap",
+                                       (folder / "broken.exr").string(),
+                                       "-o",
+                                       (folder / "out.png").string(),
+                                       "--force"});
+    EXPECT_EQ(run.exit_code, kFailed);
+    EXPECT_THAT(run.messages, HasSubstr("broken.exr"));
+    EXPECT_EQ(textOf(folder / "out.png"), "mine");
+
+    const ProgramRun odd =
+        runProgram({"tonemap", (folder / "in.exr").string(), "-o", (folder / "out.docx").string()});
+    EXPECT_EQ(odd.exit_code, kFailed);
+    EXPECT_THAT(odd.messages, HasSubstr("out.docx"));
+    EXPECT_THAT(folder.names(), UnorderedElementsAre("in.exr", "broken.exr", "out.png"));
+}
+
+TEST(Tonemap, RefusesAnEncodedPicture)
+{
+    const ScratchFolder folder;
+    writeEncoded(folder / "in.png", grey(4, 4, 100));
+    const ProgramRun run =
+        runProgram({"tonemap", (folder / "in.png").string(), "-o", (folder / "out.png").string()});
+    EXPECT_EQ(run.exit_code, kFailed);
+    EXPECT_THAT(run.messages, HasSubstr("not a radiance image"));
+}
+
+// Radiance 1 and 4 shown as 1.5 and 3, in all channels: NRMSE sqrt((0.25 + 1) / 2) / 3, mean
+// (50 + 25) / 2 %.
+TEST(Compare, GivesTheNumbersAsTextAndJson)
+{
+    const ScratchFolder folder;
+    Image<Rgb> reference(2, 1, Rgb(1.0f));
+    Image<Rgb> picture(2, 1, Rgb(1.5f));
+    reference(1, 0) = Rgb(4.0f);
+    picture(1, 0) = Rgb(3.0f);
+    writeRadiance(folder / "a.exr", reference);
+    writeRadiance(folder / "b.exr", picture);
+    const ProgramRun run = runProgram({"compare",
+                                       (folder / "a.exr").string(),
+                                       (folder / "b.exr").string(),
+                                       "--json",
+                                       (folder / "errors.json").string()});
+    EXPECT_EQ(run.exit_code, kDone);
+    EXPECT_THAT(run.output, HasSubstr("mean %        37.5\n"));
+    const Json json = readJson(folder / "errors.json");
+    EXPECT_NEAR(json["nrmse"].get<double>(), std::sqrt(0.625) / 3.0, tolerance::kDouble);
+    EXPECT_NEAR(json["mean_percent"].get<double>(), 37.5, 37.5 * tolerance::kFloat);
+    EXPECT_EQ(json["pixels"].get<int>(), 2);
+    EXPECT_FALSE(json.contains("differing_pixels"));
+}
+
+TEST(Compare, CountsCodesOfEncodedPicturesInsideTheMask)
+{
+    const ScratchFolder folder;
+    EncodedImage picture = grey(4, 1, 100);
+    picture.codes(0, 0).r = 90;
+    picture.codes(3, 0).g = 103;
+    EncodedImage mask = grey(4, 1, 0);
+    mask.codes(2, 0) = mask.codes(3, 0) = glm::u16vec3(255);
+    writeEncoded(folder / "a.png", grey(4, 1, 100));
+    writeEncoded(folder / "b.png", picture);
+    writeEncoded(folder / "mask.png", mask);
+    const std::vector<std::string> arguments = {
+        "compare", (folder / "a.png").string(), (folder / "b.png").string()};
+    EXPECT_THAT(runProgram(arguments).output, HasSubstr("2 pixels, at most by 10 codes"));
+    std::vector<std::string> masked = arguments;
+    masked.insert(masked.end(), {"--mask", (folder / "mask.png").string()});
+    EXPECT_THAT(runProgram(masked).output, HasSubstr("1 pixels, at most by 3 codes"));
+}
+
+TEST(Compare, BlackMaskAdmitsNoAnswer)
+{
+    const ScratchFolder folder;
+    writeEncoded(folder / "a.png", grey(3, 3, 100));
+    writeEncoded(folder / "black.png", grey(3, 3, 0));
+    const std::string picture = (folder / "a.png").string();
+    const ProgramRun run =
+        runProgram({"compare", picture, picture, "--mask", (folder / "black.png").string()});
+    EXPECT_EQ(run.exit_code, kNoAnswer);
+    EXPECT_THAT(run.messages, HasSubstr("black.png"));
+}
+
+TEST(Compare, RefusesSizesAndKindsThatDiffer)
+{
+    const ScratchFolder folder;
+    writeEncoded(folder / "a.png", grey(3, 3, 100));
+    writeEncoded(folder / "wide.png", grey(4, 3, 100));
+    writeRadiance(folder / "a.exr", Image<Rgb>(3, 3, Rgb(1.0f)));
+    const std::string picture = (folder / "a.png").string();
+    const ProgramRun sizes = runProgram({"compare", picture, (folder / "wide.png").string()});
+    EXPECT_EQ(sizes.exit_code, kFailed);
+    EXPECT_THAT(sizes.messages, HasSubstr("4x3"));
+    const ProgramRun kinds = runProgram({"compare", picture, (folder / "a.exr").string()});
+    EXPECT_EQ(kinds.exit_code, kFailed);
+    EXPECT_THAT(kinds.messages, HasSubstr("no common unit"));
+    const ProgramRun mask =
+        runProgram({"compare", picture, picture, "--mask", (folder / "wide.png").string()});
+    EXPECT_EQ(mask.exit_code, kFailed);
+}
+
+}  // namespace
+}  // namespace insitu::cli
