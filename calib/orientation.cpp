@@ -1,176 +1,25 @@
 #include "calib/orientation.h"
 
+#include "calib/orientation_refine.h"
 #include "calib/vanishing_points.h"
 
 #include <Eigen/Dense>
-#include <ceres/ceres.h>
-#include <ceres/rotation.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace insitu {
 
 namespace {
 
-/// Focal lengths beyond these multiples of the picture's long side are no lens (170° and 2°).
-constexpr double kShortestFocal = 0.05;
-constexpr double kLongestFocal = 30.0;
+using orientation::Pose;
+using orientation::Refined;
+using orientation::Task;
+
 /// Starts for the focal length, in long sides: fish-eye to long tele.
 constexpr double kFocalStarts[] = {0.4, 0.6, 0.85, 1.2, 1.8, 3.0, 6.0};
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-
-/// A segment relative to the principal point.
-struct CentredSegment {
-    int axis;
-    glm::dvec2 middle;
-    glm::dvec2 half;
-};
-
-/// Signed distance of the segment's ends from the line through its middle and the vanishing point
-/// of the axis' direction (in the camera's frame).
-template <typename T>
-T endDistance(const CentredSegment& segment, const T* direction, const T& focal)
-{
-    const T tx = focal * direction[0] - segment.middle.x * direction[2];
-    const T ty = focal * direction[1] - segment.middle.y * direction[2];
-    // Only a vanishing point in the very middle of its own segment makes t zero; the tiny term
-    // keeps the derivative finite there.
-    const T norm = sqrt(tx * tx + ty * ty + 1e-24 * focal * focal);
-    return (tx * segment.half.y - ty * segment.half.x) / norm;
-}
-
-/// Normalised residual of one segment over (rotation vector, ln focal).
-struct SegmentCost {
-    CentredSegment segment;
-    glm::dvec3 direction;  ///< the axis at the current rotation
-    double sigma_px;
-
-    template <typename T>
-    bool operator()(const T* const parameters, T* residual) const
-    {
-        using std::exp;
-        using std::sqrt;
-        const T start[3] = {T(direction.x), T(direction.y), T(direction.z)};
-        T turned[3];
-        ceres::AngleAxisRotatePoint(parameters, start, turned);
-        residual[0] =
-            endDistance(segment, turned, T(exp(parameters[3]))) * (std::numbers::sqrt2 / sigma_px);
-        return true;
-    }
-};
-
-struct PriorCost {
-    FocalPrior prior;
-
-    template <typename T>
-    bool operator()(const T* const parameters, T* residual) const
-    {
-        residual[0] = (parameters[3] - std::log(prior.focal_px)) / prior.sigma;
-        return true;
-    }
-};
-
-struct Task {
-    std::vector<CentredSegment> segments;
-    double sigma_px;
-    std::optional<FocalPrior> prior;
-    double long_side;
-};
-
-struct Start {
-    glm::dmat3 camera_from_world{1.0};
-    double focal_px = 0.0;
-};
-
-glm::dmat3 rotationFrom(const double* rotation_vector)
-{
-    double m[9];
-    ceres::AngleAxisToRotationMatrix(rotation_vector, m);  // column-major, as GLM
-    return glm::dmat3(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]);
-}
-
-void addResiduals(const Task& task,
-                  const glm::dmat3& camera_from_world,
-                  double* parameters,
-                  bool with_prior,
-                  ceres::Problem& problem)
-{
-    for (const CentredSegment& segment : task.segments)
-        problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SegmentCost, 1, 4>(new SegmentCost{
-                                     segment, camera_from_world[segment.axis], task.sigma_px}),
-                                 nullptr,
-                                 parameters);
-    if (with_prior && task.prior)
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<PriorCost, 1, 4>(new PriorCost{*task.prior}),
-            nullptr,
-            parameters);
-}
-
-/// Half the sum of squared residuals at a start.
-double costAt(const Task& task, const Start& start)
-{
-    double sum = 0.0;
-    for (const CentredSegment& segment : task.segments) {
-        const glm::dvec3 d = start.camera_from_world[segment.axis];
-        const double direction[3] = {d.x, d.y, d.z};
-        const double distance = endDistance(segment, direction, start.focal_px);
-        sum += 2.0 * distance * distance / (task.sigma_px * task.sigma_px);
-    }
-    if (task.prior) {
-        const double r = std::log(start.focal_px / task.prior->focal_px) / task.prior->sigma;
-        sum += r * r;
-    }
-    return 0.5 * sum;
-}
-
-struct Refined {
-    Start at;
-    double cost = kInfinite;
-};
-
-std::optional<Refined> refine(const Task& task, const Start& start)
-{
-    double parameters[4] = {0.0, 0.0, 0.0, std::log(start.focal_px)};
-    ceres::Problem problem;
-    addResiduals(task, start.camera_from_world, parameters, true, problem);
-    problem.SetParameterLowerBound(parameters, 3, std::log(kShortestFocal * task.long_side));
-    problem.SetParameterUpperBound(parameters, 3, std::log(kLongestFocal * task.long_side));
-    ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_QR;
-    options.logging_type = ceres::SILENT;
-    options.max_num_iterations = 200;
-    options.function_tolerance = 1e-16;
-    options.gradient_tolerance = 1e-14;
-    options.parameter_tolerance = 1e-14;
-    options.num_threads = 1;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &problem, &summary);
-    if (!summary.IsSolutionUsable() || !std::isfinite(summary.final_cost)) return std::nullopt;
-    return Refined{{rotationFrom(parameters) * start.camera_from_world, std::exp(parameters[3])},
-                   summary.final_cost};
-}
-
-/// JᵀJ of the segments alone at the solution.
-Eigen::Matrix4d linesInformation(const Task& task, const Start& at)
-{
-    double parameters[4] = {0.0, 0.0, 0.0, std::log(at.focal_px)};
-    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-    for (const CentredSegment& segment : task.segments) {
-        const ceres::AutoDiffCostFunction<SegmentCost, 1, 4> cost(
-            new SegmentCost{segment, at.camera_from_world[segment.axis], task.sigma_px});
-        const double* blocks[] = {parameters};
-        double residual = 0.0;
-        Eigen::Vector4d gradient;
-        double* jacobians[] = {gradient.data()};
-        cost.Evaluate(blocks, &residual, jacobians);
-        information += gradient * gradient.transpose();
-    }
-    return information;
-}
 
 /// Standard deviation of the last parameter, the others free (Schur complement).
 double lastSigma(const Eigen::Matrix4d& information)
@@ -193,9 +42,7 @@ void fillCovariance(const Task& task, OrientationEstimate& estimate)
     const Eigen::LDLT<Eigen::Matrix4d> solver(information);
     const bool known = solver.info() == Eigen::Success && solver.isPositive() &&
                        solver.rcond() > 1e-14 && std::isfinite(lastSigma(information));
-    const Eigen::Matrix4d covariance =
-        known ? Eigen::Matrix4d(solver.solve(Eigen::Matrix4d::Identity()))
-              : Eigen::Matrix4d(kInfinite * Eigen::Vector4d::Ones().asDiagonal());
+    const Eigen::Matrix4d covariance = solver.solve(Eigen::Matrix4d::Identity());
     for (int row = 0; row < 4; ++row)
         for (int column = 0; column < 4; ++column)
             estimate.covariance[row][column] =
@@ -223,36 +70,41 @@ struct AxisLines {
     std::vector<LineSegment> segments;
 };
 
-/// The best start at one focal length over all ordered pairs of axes.
-std::optional<Start> bestStart(const Task& task,
-                               const std::array<AxisLines, 3>& axes,
-                               glm::dvec2 principal_px,
-                               double focal_px)
+/// Direction of an axis at a focal length, `other` being that of an axis at right angles.
+std::optional<glm::dvec3> directionBeside(const AxisLines& axis,
+                                          glm::dvec3 other,
+                                          glm::dvec2 principal_px,
+                                          double focal_px)
 {
-    std::optional<Start> best;
+    if (axis.vanishing) return axis.vanishing->direction(focal_px);
+    if (axis.segments.empty()) return std::nullopt;
+    // One segment: the direction lies in its plane and is perpendicular to the other.
+    const LineSegment& only = axis.segments.front();
+    const glm::dvec3 normal = glm::cross(glm::dvec3((only.from_px - principal_px) / focal_px, 1.0),
+                                         glm::dvec3((only.to_px - principal_px) / focal_px, 1.0));
+    const glm::dvec3 direction = glm::cross(normal, other);
+    if (glm::length(direction) < 1e-9) return std::nullopt;
+    return glm::normalize(direction);
+}
+
+/// The best start at one focal length over all ordered pairs of axes.
+std::optional<Pose> bestStart(const Task& task,
+                              const std::array<AxisLines, 3>& axes,
+                              glm::dvec2 principal_px,
+                              double focal_px)
+{
+    std::optional<Pose> best;
     double best_cost = kInfinite;
     for (int first = 0; first < 3; ++first) {
         if (!axes[first].vanishing) continue;
         const glm::dvec3 a = axes[first].vanishing->direction(focal_px);
         for (int second = 0; second < 3; ++second) {
-            if (second == first || axes[second].segments.empty()) continue;
-            glm::dvec3 b(0.0);
-            if (axes[second].vanishing) {
-                b = axes[second].vanishing->direction(focal_px);
-            } else {
-                // One segment: its direction lies in its plane and is perpendicular to the first.
-                const LineSegment& only = axes[second].segments.front();
-                const glm::dvec3 normal =
-                    glm::cross(glm::dvec3((only.from_px - principal_px) / focal_px, 1.0),
-                               glm::dvec3((only.to_px - principal_px) / focal_px, 1.0));
-                b = glm::cross(normal, a);
-                if (glm::length(b) < 1e-9) continue;
-                b = glm::normalize(b);
-            }
-            const auto rotation = rotationFromTwo(first, a, second, b);
+            if (second == first) continue;
+            const auto b = directionBeside(axes[second], a, principal_px, focal_px);
+            const auto rotation = b ? rotationFromTwo(first, a, second, *b) : std::nullopt;
             if (!rotation) continue;
-            const Start start{*rotation, focal_px};
-            const double cost = costAt(task, start);
+            const Pose start{*rotation, focal_px};
+            const double cost = roughCost(task, start);
             if (cost < best_cost) {
                 best_cost = cost;
                 best = start;
@@ -273,27 +125,29 @@ std::vector<double> focalStarts(const Task& task, const std::array<AxisLines, 3>
                     focals.push_back(*f);
     for (const double factor : kFocalStarts)
         focals.push_back(factor * task.long_side);
-    const double shortest = 1.01 * kShortestFocal * task.long_side;
-    const double longest = 0.99 * kLongestFocal * task.long_side;
+    const double shortest = 1.01 * orientation::kShortestFocal * task.long_side;
+    const double longest = 0.99 * orientation::kLongestFocal * task.long_side;
     for (double& focal : focals)
         focal = std::clamp(focal, shortest, longest);
     return focals;
 }
 
-OrientationEstimate describe(const Task& task, const Refined& refined)
+OrientationEstimate describe(const Task& task, const Task& separate, const Refined& refined)
 {
     OrientationEstimate estimate;
     estimate.camera_from_world = refined.at.camera_from_world;
     estimate.focal_px = refined.at.focal_px;
-    for (const CentredSegment& segment : task.segments) {
-        const glm::dvec3 d = estimate.camera_from_world[segment.axis];
-        const double direction[3] = {d.x, d.y, d.z};
-        const double distance = std::abs(endDistance(segment, direction, estimate.focal_px));
-        estimate.distances_px.push_back(distance);
-        estimate.chi_squared += 2.0 * distance * distance / (task.sigma_px * task.sigma_px);
-    }
+    for (const orientation::Edge& edge : separate.edges)
+        estimate.distances_px.push_back(std::abs(endDistance(separate, edge, refined.at)));
+    const double of_prior =
+        task.prior ? std::log(estimate.focal_px / task.prior->focal_px) / task.prior->sigma : 0.0;
+    estimate.chi_squared = 2.0 * refined.cost - of_prior * of_prior + task.spread;
+    const double shared = static_cast<double>(separate.points.size() - task.points.size());
+    estimate.freedom =
+        static_cast<double>(task.edges.size()) + 2.0 * shared - (task.prior ? 3.0 : 4.0);
     const double relative = estimate.focal_px / task.long_side;
-    estimate.focal_at_limit = relative < 1.02 * kShortestFocal || relative > 0.98 * kLongestFocal;
+    estimate.focal_at_limit = relative < 1.02 * orientation::kShortestFocal ||
+                              relative > 0.98 * orientation::kLongestFocal;
     fillCovariance(task, estimate);
     return estimate;
 }
@@ -313,29 +167,31 @@ double OrientationEstimate::rotationSigma() const
 std::optional<OrientationEstimate> solveOrientation(const LineSet& lines,
                                                     glm::dvec2 principal_px,
                                                     double sigma_px,
-                                                    const std::optional<FocalPrior>& prior)
+                                                    const std::optional<FocalPrior>& prior,
+                                                    Corners corners)
 {
-    Task task{{}, sigma_px, prior, static_cast<double>(std::max(lines.width, lines.height))};
+    const Task separate =
+        orientation::makeTask(lines, principal_px, sigma_px, prior, Corners::Separate);
     std::array<AxisLines, 3> axes;
-    for (const LineSegment& segment : lines.segments) {
-        const int axis = static_cast<int>(segment.axis);
-        axes[axis].segments.push_back(segment);
-        task.segments.push_back({axis,
-                                 0.5 * (segment.from_px + segment.to_px) - principal_px,
-                                 0.5 * (segment.to_px - segment.from_px)});
-    }
+    for (const LineSegment& segment : lines.segments)
+        axes[static_cast<std::size_t>(segment.axis)].segments.push_back(segment);
     for (AxisLines& axis : axes)
-        axis.vanishing = vanishingPoint(axis.segments, principal_px, task.long_side);
+        axis.vanishing = vanishingPoint(axis.segments, principal_px, separate.long_side);
 
     std::optional<Refined> best;
-    for (const double focal_px : focalStarts(task, axes)) {
-        const auto start = bestStart(task, axes, principal_px, focal_px);
+    for (const double focal_px : focalStarts(separate, axes)) {
+        const auto start = bestStart(separate, axes, principal_px, focal_px);
         if (!start) continue;
-        const auto refined = refine(task, *start);
+        const auto refined = refineRoughly(separate, *start);
         if (refined && (!best || refined->cost < best->cost)) best = refined;
     }
     if (!best) return std::nullopt;
-    return describe(task, *best);
+    const Task task = corners == Corners::Separate
+                          ? separate
+                          : orientation::makeTask(lines, principal_px, sigma_px, prior, corners);
+    const auto refined = refineFully(task, best->at);
+    if (!refined) return std::nullopt;
+    return describe(task, separate, *refined);
 }
 
 }  // namespace insitu
