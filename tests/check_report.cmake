@@ -1,0 +1,31 @@
+# Fails unless REPORT tells of a picture that exists and was changed by its objects, without an
+# error among the findings. Use: cmake -D REPORT=<file> -D FOLDER=<what paths in it start from>
+# -P tests/check_report.cmake
+cmake_minimum_required(VERSION 3.25)
+
+file(READ ${REPORT} report)
+string(JSON format GET "${report}" format)
+string(JSON picture GET "${report}" picture)
+string(JSON influence GET "${report}" composite influence_fraction)
+string(JSON count LENGTH "${report}" findings)
+
+if(NOT format STREQUAL "insitu-report")
+  message(FATAL_ERROR "${REPORT}: is of format '${format}'")
+endif()
+cmake_path(ABSOLUTE_PATH picture BASE_DIRECTORY ${FOLDER})
+if(NOT EXISTS ${picture})
+  message(FATAL_ERROR "${REPORT}: tells of ${picture}, which does not exist")
+endif()
+if(NOT influence GREATER 0 OR NOT influence LESS 1)
+  message(FATAL_ERROR "${REPORT}: the objects change ${influence} of the picture")
+endif()
+set(index 0)
+while(index LESS count)
+  string(JSON severity GET "${report}" findings ${index} severity)
+  string(JSON code GET "${report}" findings ${index} code)
+  if(severity STREQUAL "error")
+    message(FATAL_ERROR "${REPORT}: error ${code}")
+  endif()
+  math(EXPR index "${index} + 1")
+endwhile()
+message(STATUS "${picture}: the objects change ${influence} of it; ${count} findings, no error")
