@@ -13,9 +13,11 @@ using RegisterCommand = void (*)(CLI::App&, Context&);
 
 /// Every command, in the order of the help text: the order in which a project uses them.
 constexpr RegisterCommand kCommands[] = {
+    registerCalibrate,
     registerInsert,
     registerTonemap,
     registerCompare,
+    registerSimulate,
 };
 
 std::string versionText()
