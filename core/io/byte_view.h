@@ -22,6 +22,7 @@ public:
     }
 
     [[nodiscard]] std::size_t size() const { return bytes_.size(); }
+    [[nodiscard]] ByteOrder order() const { return order_; }
     [[nodiscard]] const std::string& path() const { return path_; }
     [[nodiscard]] bool contains(std::size_t offset, std::size_t count) const
     {

@@ -17,9 +17,6 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr auto kPrefix = "Exif\0\0"sv;
-/// Sensors between a phone's front camera and a digital back.
-constexpr double kMinSensorMm = 2.0;
-constexpr double kMaxSensorMm = 100.0;
 
 struct ExifDataDeleter {
     void operator()(ExifData* data) const { exif_data_unref(data); }
@@ -37,7 +34,6 @@ ExifDataPointer load(std::span<const std::uint8_t> block)
     std::vector<std::uint8_t> prefixed;
     if (!hasPrefix(block)) {
         prefixed.assign(kPrefix.begin(), kPrefix.end());
-        // The tags of a TIFF file stand anywhere in it; libexif refuses what is too large.
         prefixed.insert(prefixed.end(), block.begin(), block.end());
         block = prefixed;
     }
@@ -45,6 +41,8 @@ ExifDataPointer load(std::span<const std::uint8_t> block)
     if (!data || block.size() > kLargestBlock) return data;
     // Otherwise libexif invents mandatory tags that the camera did not write.
     exif_data_unset_option(data.get(), EXIF_DATA_OPTION_FOLLOW_SPECIFICATION);
+    // Some converters put the exposure into the first directory, where it does not belong.
+    exif_data_unset_option(data.get(), EXIF_DATA_OPTION_IGNORE_UNKNOWN_TAGS);
     exif_data_load_data(data.get(), block.data(), static_cast<unsigned>(block.size()));
     return data;
 }
@@ -132,17 +130,32 @@ std::optional<double> pixelsPerMillimetre(ExifData* data)
     }
 }
 
-std::optional<double> focalFromFocalPlane(ExifData* data, double focal_mm, double long_side)
+/// Whether a sensor with this long side can be: not a printer's resolution, and in agreement with
+/// the film equivalent if that is known.
+bool plausibleSensor(double sensor_mm, double focal_mm, std::optional<double> focal_35mm)
+{
+    constexpr double kMinSensorMm = 4.0;  // smaller ones sit in telephones, which state focal_35mm
+    constexpr double kMaxSensorMm = 100.0;
+    constexpr double kLargestDisagreement = 1.15;  // rounding, and the two ways to equate formats
+    if (sensor_mm < kMinSensorMm || sensor_mm > kMaxSensorMm) return false;
+    if (!focal_35mm) return true;
+    const double ratio = focal_mm * exif::kFilmWidthMm / sensor_mm / *focal_35mm;
+    return ratio < kLargestDisagreement && ratio > 1.0 / kLargestDisagreement;
+}
+
+std::optional<double> focalFromFocalPlane(ExifData* data,
+                                          const PhotoMetadata& metadata,
+                                          double long_side)
 {
     const auto per_mm = pixelsPerMillimetre(data);
-    if (!per_mm) return std::nullopt;
-    const double stored_x = positive(data, EXIF_TAG_PIXEL_X_DIMENSION).value_or(0.0);
-    const double stored_y = positive(data, EXIF_TAG_PIXEL_Y_DIMENSION).value_or(0.0);
-    const double stored_long = std::max(stored_x, stored_y);
-    const double camera_long = stored_long > 0.0 ? stored_long : long_side;
-    const double sensor_mm = camera_long / *per_mm;
-    if (sensor_mm < kMinSensorMm || sensor_mm > kMaxSensorMm) return std::nullopt;
-    return focal_mm * *per_mm * long_side / camera_long;
+    if (!per_mm || !metadata.focal_mm) return std::nullopt;
+    const double stored_x = positive(data, exif::kPixelXDimension).value_or(0.0);
+    const double stored_y = positive(data, exif::kPixelYDimension).value_or(0.0);
+    const double camera_long = std::max(stored_x, stored_y);
+    if (camera_long <= 0.0) return std::nullopt;
+    if (!plausibleSensor(camera_long / *per_mm, *metadata.focal_mm, metadata.focal_35mm))
+        return std::nullopt;
+    return *metadata.focal_mm * *per_mm * long_side / camera_long;
 }
 
 }  // namespace
@@ -163,8 +176,7 @@ PhotoMetadata parseExif(std::span<const std::uint8_t> block, int width, int heig
     const int orientation = static_cast<int>(number(data, exif::kOrientation).value_or(1.0));
     metadata.orientation = orientation >= 1 && orientation <= 8 ? orientation : 1;
     const double long_side = std::max(width, height);
-    if (metadata.focal_mm)
-        metadata.focal_px = focalFromFocalPlane(data, *metadata.focal_mm, long_side);
+    metadata.focal_px = focalFromFocalPlane(data, metadata, long_side);
     if (!metadata.focal_px && metadata.focal_35mm)
         metadata.focal_px = *metadata.focal_35mm / exif::kFilmWidthMm * long_side;
     metadata.exif.assign(block.begin(), block.end());

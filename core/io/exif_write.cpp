@@ -1,6 +1,7 @@
-#include "core/io/byte_writer.h"
+#include "core/io/byte_view.h"
 #include "core/io/exif.h"
 #include "core/io/exif_tags.h"
+#include "core/io/tiff_directory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,33 +13,23 @@ namespace insitu {
 
 namespace {
 
-enum FieldType : std::uint16_t { kAscii = 2, kShort = 3, kLong = 4, kRational = 5, kUndefined = 7 };
-
-/// One entry of a TIFF directory with its value in big-endian bytes.
-struct Field {
-    std::uint16_t tag;
-    FieldType type;
-    std::uint32_t count;
-    Bytes value;
-};
-
-Field shortField(std::uint16_t tag, double value)
+TiffField shortField(std::uint16_t tag, double value)
 {
-    Field field{tag, kShort, 1, {}};
+    TiffField field{tag, TiffField::kShort, 1, {}};
     append16(field.value, static_cast<std::uint32_t>(std::clamp(std::round(value), 0.0, 65535.0)));
     return field;
 }
 
-Field longField(std::uint16_t tag, std::uint32_t value)
+TiffField longField(std::uint16_t tag, std::uint32_t value)
 {
-    Field field{tag, kLong, 1, {}};
+    TiffField field{tag, TiffField::kLong, 1, {}};
     append32(field.value, value);
     return field;
 }
 
-Field textField(std::uint16_t tag, std::string_view text)
+TiffField textField(std::uint16_t tag, std::string_view text)
 {
-    Field field{tag, kAscii, static_cast<std::uint32_t>(text.size() + 1), {}};
+    TiffField field{tag, TiffField::kAscii, static_cast<std::uint32_t>(text.size() + 1), {}};
     append(field.value, text);
     field.value.push_back(0);
     return field;
@@ -64,66 +55,39 @@ std::pair<std::uint32_t, std::uint32_t> fractionOf(double value)
     return {static_cast<std::uint32_t>(p1), static_cast<std::uint32_t>(q1)};
 }
 
-Field rationalField(std::uint16_t tag, double value)
+TiffField rationalField(std::uint16_t tag, double value)
 {
     const auto [numerator, denominator] = fractionOf(value);
-    Field field{tag, kRational, 1, {}};
+    TiffField field{tag, TiffField::kRational, 1, {}};
     append32(field.value, numerator);
     append32(field.value, denominator);
     return field;
 }
 
-std::size_t directorySize(const std::vector<Field>& fields)
+std::vector<TiffField> cameraFields(const PhotoMetadata& metadata)
 {
-    std::size_t size = 2 + 12 * fields.size() + 4;
-    for (const Field& field : fields)
-        if (field.value.size() > 4) size += (field.value.size() + 1) / 2 * 2;
-    return size;
-}
-
-/// Appends a directory (TIFF 6.0, section 2); offsets count from `tiff`'s beginning.
-void putDirectory(Bytes& tiff, const std::vector<Field>& fields)
-{
-    std::size_t value_at = tiff.size() + 2 + 12 * fields.size() + 4;
-    append16(tiff, static_cast<std::uint32_t>(fields.size()));
-    Bytes values;
-    for (const Field& field : fields) {
-        append16(tiff, field.tag);
-        append16(tiff, field.type);
-        append32(tiff, field.count);
-        Bytes value = field.value;
-        if (value.size() <= 4) {
-            value.resize(4, 0);
-            append(tiff, value);
-            continue;
-        }
-        if (value.size() % 2 == 1) value.push_back(0);
-        append32(tiff, static_cast<std::uint32_t>(value_at + values.size()));
-        append(values, value);
-    }
-    append32(tiff, 0);  // no further directory
-    append(tiff, values);
-}
-
-std::vector<Field> cameraFields(const PhotoMetadata& metadata)
-{
-    std::vector<Field> fields;
+    std::vector<TiffField> fields;
     if (!metadata.make.empty()) fields.push_back(textField(exif::kMake, metadata.make));
     if (!metadata.model.empty()) fields.push_back(textField(exif::kModel, metadata.model));
     fields.push_back(shortField(exif::kOrientation, 1));
     return fields;
 }
 
-std::vector<Field> exposureFields(const PhotoMetadata& metadata)
+std::vector<TiffField> exposureFields(const PhotoMetadata& metadata, int width, int height)
 {
     const Exposure& exposure = metadata.exposure;
-    std::vector<Field> fields;
+    std::vector<TiffField> fields;
     if (exposure.seconds) fields.push_back(rationalField(exif::kExposureTime, *exposure.seconds));
     if (exposure.f_number) fields.push_back(rationalField(exif::kFNumber, *exposure.f_number));
     if (exposure.iso) fields.push_back(shortField(exif::kSensitivity, *exposure.iso));
-    fields.push_back({exif::kExifVersion, kUndefined, 4, {'0', '2', '3', '2'}});
+    fields.push_back({exif::kExifVersion, TiffField::kUndefined, 4, {'0', '2', '3', '2'}});
     if (metadata.focal_mm) fields.push_back(rationalField(exif::kFocalLength, *metadata.focal_mm));
-    if (metadata.focal_mm && metadata.focal_px) {
+    const bool sized = width > 0 && height > 0;
+    if (sized) {
+        fields.push_back(longField(exif::kPixelXDimension, static_cast<std::uint32_t>(width)));
+        fields.push_back(longField(exif::kPixelYDimension, static_cast<std::uint32_t>(height)));
+    }
+    if (sized && metadata.focal_mm && metadata.focal_px) {
         constexpr double kMillimetresPerCentimetre = 10.0;
         const double per_cm = *metadata.focal_px / *metadata.focal_mm * kMillimetresPerCentimetre;
         fields.push_back(rationalField(exif::kFocalPlaneXResolution, per_cm));
@@ -134,20 +98,47 @@ std::vector<Field> exposureFields(const PhotoMetadata& metadata)
     return fields;
 }
 
-}  // namespace
-
-Bytes makeExif(const PhotoMetadata& metadata)
+/// The block of a camera directory and the EXIF directory that its last field points to.
+Bytes blockOf(std::vector<TiffField> camera, const std::vector<TiffField>& exposure)
 {
     Bytes tiff = {'M', 'M', 0, 42, 0, 0, 0, 8};
-    std::vector<Field> camera = cameraFields(metadata);
     camera.push_back(longField(exif::kExifDirectory, 0));
     const std::size_t exif_at = tiff.size() + directorySize(camera);
     camera.back() = longField(exif::kExifDirectory, static_cast<std::uint32_t>(exif_at));
-    putDirectory(tiff, camera);
-    putDirectory(tiff, exposureFields(metadata));
+    appendDirectory(tiff, camera);
+    appendDirectory(tiff, exposure);
     Bytes block = {'E', 'x', 'i', 'f', 0, 0};
     append(block, tiff);
     return block;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> makeExif(const PhotoMetadata& metadata, int width, int height)
+{
+    return blockOf(cameraFields(metadata), exposureFields(metadata, width, height));
+}
+
+std::vector<std::uint8_t> exifOfTiff(std::span<const std::uint8_t> file)
+{
+    const bool big = !file.empty() && file[0] == 'M';
+    const ByteView tiff(file, "TIFF", big ? ByteOrder::Big : ByteOrder::Little);
+    std::vector<TiffField> camera;
+    std::vector<TiffField> exposure;
+    try {
+        for (TiffField& field : readDirectory(tiff, tiff.u32(4))) {
+            const bool of_camera = field.tag == exif::kMake || field.tag == exif::kModel ||
+                                   field.tag == exif::kOrientation;
+            if (of_camera)
+                camera.push_back(std::move(field));
+            else if (field.tag == exif::kExifDirectory)
+                exposure = readDirectory(tiff, integerValue(field));
+        }
+    } catch (const InputError&) {
+        return {};  // a damaged block is as good as none; the picture may be whole
+    }
+    std::erase_if(exposure, [](const TiffField& field) { return field.tag == exif::kMakerNote; });
+    return blockOf(std::move(camera), exposure);
 }
 
 }  // namespace insitu

@@ -37,13 +37,20 @@ void writeFile(const std::filesystem::path& path,
                const Imf::FrameBuffer& buffer,
                int rows)
 {
-    try {
-        Imf::OutputFile file(path.string().c_str(), header);
-        file.setFrameBuffer(buffer);
-        file.writePixels(rows);
-    } catch (const std::exception& error) {
-        throw InputError(path.string(), fmt::format("cannot be written: {}", error.what()));
-    }
+    writeAtomically(path, [&](const std::filesystem::path& temporary) {
+        try {
+            Imf::OutputFile file(temporary.string().c_str(), header);
+            file.setFrameBuffer(buffer);
+            file.writePixels(rows);
+        } catch (const std::exception& error) {
+            // The user knows nothing of the temporary name.
+            std::string cause = error.what();
+            const auto at = cause.find(temporary.string());
+            if (at != std::string::npos)
+                cause.replace(at, temporary.string().size(), path.string());
+            throw InputError(path.string(), "cannot be written: " + cause);
+        }
+    });
 }
 
 /// Half pixels of the image, clamped to what a half can hold.

@@ -49,7 +49,7 @@ float floatAt(std::span<const std::uint8_t> bytes, std::size_t at, bool little)
 
 bool isPfm(std::span<const std::uint8_t> bytes)
 {
-    return bytes.size() > 3 && bytes[0] == 'P' && (bytes[1] == 'F' || bytes[1] == 'f') &&
+    return bytes.size() >= 3 && bytes[0] == 'P' && (bytes[1] == 'F' || bytes[1] == 'f') &&
            isSpace(bytes[2]);
 }
 

@@ -1,3 +1,4 @@
+#include "core/io/byte_writer.h"
 #include "core/io/encoded_header.h"
 #include "core/io/exif.h"
 #include "core/io/file.h"
@@ -79,11 +80,9 @@ Image<glm::u16vec3> upright(Image<glm::u16vec3> stored, int orientation)
 PhotoMetadata readMetadata(const EncodedHeader& header, std::span<const std::uint8_t> bytes)
 {
     const bool tiff = header.format == EncodedHeader::Format::Tiff;
-    const std::span<const std::uint8_t> block = tiff ? bytes : std::span(header.exif);
+    const Bytes block = tiff ? exifOfTiff(bytes) : header.exif;
     PhotoMetadata metadata = parseExif(block, header.width, header.height);
     metadata.has_icc_profile = header.has_icc_profile;
-    // A TIFF's block is the whole file, pixels included: outputs get a new one with its facts.
-    metadata.exif = tiff ? makeExif(metadata) : header.exif;
     return metadata;
 }
 

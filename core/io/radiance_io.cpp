@@ -79,7 +79,7 @@ void writeRadiance(const std::filesystem::path& path, const Image<Rgb>& image, b
             INSITU_CHECK(isFinite(image(x, y)), "pixel ({}, {}) is not finite", x, y);
     const std::string extension = lowerCaseExtension(path);
     if (extension == ".exr")
-        writeAtomically(path, [&](const auto& temporary) { writeExr(temporary, image, half); });
+        writeExr(path, image, half);
     else if (extension == ".hdr" || extension == ".pic")
         writeBytes(path, encodeRgbe(image));
     else if (extension == ".pfm")
