@@ -31,7 +31,7 @@ struct PathOptions {
 struct RenderOptions {
     int samples_per_pixel = 64;  ///< > 0
     std::uint64_t seed = 1;
-    PathOptions path;
+    PathOptions path{};
     /// Stop after this many seconds at a whole sample pass; 0 = no limit. With a limit the result
     /// depends on the machine's speed.
     double max_seconds = 0.0;

@@ -3,6 +3,7 @@
 #include "core/color.h"
 #include "lighting/sampling.h"
 #include "render/bsdf/ggx.h"
+#include "render/bsdf/ggx_albedo.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,18 +29,22 @@ double schlick(double cosine)
 /// f90 mixes specular and 1, both by metallic (glTF 2.0 B.2.1, KHR_materials_specular).
 ///
 /// Diffuse: glTF scales base/π by 1 − F(wo·h), which sends back up to twice the light at grazing
-/// angles of a smooth surface. Instead, with g(c) = 1 − F_dielectric(c), as in [Shirley97] 3,
-///   f_d = base/π · g(cos_o) g(cos_i) / ∫ 2c g(c) dc,   ∫ 2c g = 1 − f0 − (f90 − f0)/21,
-/// whose reflectance for light from wo is base·g(cos_o): what the smooth coat lets through.
+/// angles of a smooth surface. Instead the base gets what the dielectric coat does not reflect, on
+/// the way in and on the way out [KelSzi01]: with E the coat's directional albedo,
+///   f_d = base/π · (1 − E(cos_o)) (1 − E(cos_i)) / (1 − mean E),
+/// whose reflectance for light from wo is base·(1 − E(cos_o)). A white dielectric thus reflects
+/// all.
 class Lobes {
 public:
     explicit Lobes(const SurfaceMaterial& m)
-        : alpha_(std::max(1e-4, static_cast<double>(m.roughness) * m.roughness)),
-          dielectric_f0_(0.04 * m.specular),
-          dielectric_f90_(m.specular),
-          f0_(glm::mix(glm::dvec3(dielectric_f0_), glm::dvec3(m.base_color), double(m.metallic))),
-          f90_(glm::mix(dielectric_f90_, 1.0, double(m.metallic))),
+        : roughness_(m.roughness),
+          alpha_(ggx::alphaFromRoughness(roughness_)),
+          coat_f0_(0.04 * m.specular),
+          coat_f90_(m.specular),
+          f0_(glm::mix(glm::dvec3(coat_f0_), glm::dvec3(m.base_color), double(m.metallic))),
+          f90_(glm::mix(coat_f90_, 1.0, double(m.metallic))),
           diffuse_(glm::dvec3(m.base_color) * (1.0 - double(m.metallic))),
+          coated_(m.specular > 0.0f && m.metallic < 1.0f),
           glossy_(isGlossy(m))
     {
     }
@@ -47,13 +52,14 @@ public:
     [[nodiscard]] glm::dvec3 evaluate(glm::dvec3 wo, glm::dvec3 wi) const
     {
         if (!(wi.z > 0.0)) return glm::dvec3(0.0);
-        const double mean = 1.0 - dielectric_f0_ - (dielectric_f90_ - dielectric_f0_) / 21.0;
-        glm::dvec3 f(0.0);
-        if (mean > 0.0) f = diffuse_ * (transmitted(wo.z) * transmitted(wi.z) / (mean * pi));
+        glm::dvec3 f = diffuse_ / pi;
+        if (coated_)
+            f *= transmitted(wo.z) * transmitted(wi.z) /
+                 (1.0 - ggx::meanAlbedo(roughness_).of(coat_f0_, coat_f90_));
         if (glossy_ && wo.z > 0.0) {
             const glm::dvec3 h = glm::normalize(wo + wi);
             const double facets = ggx::distribution(h, alpha_) * ggx::visibility(wo, wi, alpha_);
-            f += fresnel(glm::dot(wo, h)) * facets;
+            f += (f0_ + (f90_ - f0_) * schlick(glm::dot(wo, h))) * facets;
         }
         return f;
     }
@@ -84,31 +90,31 @@ public:
     }
 
 private:
-    [[nodiscard]] glm::dvec3 fresnel(double cosine) const
-    {
-        return f0_ + (f90_ - f0_) * schlick(cosine);
-    }
-    /// g of the comment above.
+    /// What the coat lets through, 1 − E.
     [[nodiscard]] double transmitted(double cosine) const
     {
-        return 1.0 - dielectric_f0_ - (dielectric_f90_ - dielectric_f0_) * schlick(cosine);
+        return 1.0 - ggx::directionalAlbedo(roughness_, cosine).of(coat_f0_, coat_f90_);
     }
     /// Share of draws that go to the glossy lobe: by what each lobe reflects, neither starved.
     [[nodiscard]] double glossyShare(glm::dvec3 wo) const
     {
         if (!glossy_ || !(wo.z > 0.0)) return 0.0;
-        const double glossy = static_cast<double>(luminance(Rgb(fresnel(wo.z))));
-        const double diffuse = static_cast<double>(luminance(Rgb(diffuse_))) * transmitted(wo.z);
-        if (!(diffuse > 0.0)) return 1.0;
+        const auto base = static_cast<double>(luminance(Rgb(diffuse_)));
+        if (!(base > 0.0)) return 1.0;
+        const ggx::Albedo albedo = ggx::directionalAlbedo(roughness_, wo.z);
+        const double glossy = albedo.of(static_cast<double>(luminance(Rgb(f0_))), f90_);
+        const double diffuse = base * (1.0 - albedo.of(coat_f0_, coat_f90_));
         return std::clamp(glossy / (glossy + diffuse), 0.1, 0.9);
     }
 
+    double roughness_;
     double alpha_;
-    double dielectric_f0_;
-    double dielectric_f90_;
-    glm::dvec3 f0_;
+    double coat_f0_;  ///< of the dielectric part
+    double coat_f90_;
+    glm::dvec3 f0_;  ///< of the whole
     double f90_;
     glm::dvec3 diffuse_;
+    bool coated_;
     bool glossy_;
 };
 
