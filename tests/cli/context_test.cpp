@@ -1,6 +1,6 @@
 #include "apps/cli/command.h"
 #include "apps/cli/terminal_progress.h"
-#include "tests/cli/run_program.h"
+#include "tests/support/temporary_folder.h"
 
 #include <gmock/gmock.h>
 
@@ -24,7 +24,7 @@ std::string refusal(const Context& context, const std::filesystem::path& path)
 
 TEST(Context, RefusesToOverwriteUnlessForced)
 {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     Context context;
     EXPECT_EQ(refusal(context, folder / "new.png"), "");
     std::ofstream(folder / "old.png") << "mine";
@@ -35,11 +35,11 @@ TEST(Context, RefusesToOverwriteUnlessForced)
 
 TEST(Context, RefusesOutputsThatCannotBeWritten)
 {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     Context context;
     context.options.force = true;
     EXPECT_THAT(refusal(context, folder / "missing" / "new.png"), HasSubstr("does not exist"));
-    EXPECT_THAT(refusal(context, (folder / "x").parent_path()), HasSubstr("is a folder"));
+    EXPECT_THAT(refusal(context, folder.path()), HasSubstr("is a folder"));
     EXPECT_THAT(refusal(context, ""), HasSubstr("empty"));
     EXPECT_EQ(refusal(context, "-"), "");
 }
