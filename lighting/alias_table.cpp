@@ -26,15 +26,14 @@ AliasTable::AliasTable(std::span<const double> weights)
 
     const std::size_t n = weights.size();
     probabilities_.resize(n);
-    thresholds_.assign(n, 1.0);
-    aliases_.resize(n);
+    slots_.resize(n);
     std::vector<std::uint32_t> poor;
     std::vector<std::uint32_t> rich;
     std::vector<double> scaled(n);
     for (std::size_t i = 0; i < n; ++i) {
         probabilities_[i] = weights[i] / total_weight_;
         scaled[i] = probabilities_[i] * static_cast<double>(n);
-        aliases_[i] = static_cast<std::uint32_t>(i);
+        slots_[i].alias = static_cast<std::uint32_t>(i);
         (scaled[i] < 1.0 ? poor : rich).push_back(static_cast<std::uint32_t>(i));
     }
 
@@ -43,8 +42,7 @@ AliasTable::AliasTable(std::span<const double> weights)
         const std::uint32_t small = poor.back();
         const std::uint32_t large = rich.back();
         poor.pop_back();
-        thresholds_[small] = scaled[small];
-        aliases_[small] = large;
+        slots_[small] = {scaled[small], large};
         scaled[large] -= 1.0 - scaled[small];
         if (scaled[large] < 1.0) {
             rich.pop_back();
@@ -56,10 +54,7 @@ AliasTable::AliasTable(std::span<const double> weights)
     const auto heaviest = static_cast<std::uint32_t>(
         std::max_element(weights.begin(), weights.end()) - weights.begin());
     for (const std::uint32_t slot : poor)
-        if (weights[slot] == 0.0) {
-            thresholds_[slot] = 0.0;
-            aliases_[slot] = heaviest;
-        }
+        if (weights[slot] == 0.0) slots_[slot] = {0.0, heaviest};
 }
 
 AliasTable::Draw AliasTable::sample(double u) const
@@ -67,11 +62,11 @@ AliasTable::Draw AliasTable::sample(double u) const
     const double scaled = std::clamp(u, 0.0, kOneBelow) * static_cast<double>(size());
     const std::size_t slot = std::min(static_cast<std::size_t>(scaled), size() - 1);
     const double within = scaled - static_cast<double>(slot);
-    const double threshold = thresholds_[slot];
+    const auto& [threshold, alias] = slots_[slot];
     const bool own = within < threshold;
     const double rest =
         own ? within / threshold : (within - threshold) / std::max(1.0 - threshold, 1e-300);
-    return {own ? slot : aliases_[slot], std::min(rest, kOneBelow)};
+    return {own ? slot : alias, std::min(rest, kOneBelow)};
 }
 
 }  // namespace insitu

@@ -29,9 +29,13 @@ public:
     [[nodiscard]] double totalWeight() const { return total_weight_; }
 
 private:
+    /// One memory access a draw: large tables are read at random.
+    struct Slot {
+        double threshold = 1.0;  ///< share of the slot that keeps its own index
+        std::uint32_t alias = 0;
+    };
     std::vector<double> probabilities_;
-    std::vector<double> thresholds_;  ///< share of a slot that keeps its own index
-    std::vector<std::uint32_t> aliases_;
+    std::vector<Slot> slots_;
     double total_weight_ = 0.0;
 };
 

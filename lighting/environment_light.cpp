@@ -78,6 +78,12 @@ void EnvironmentLight::buildSky()
     }
     if (!(total > 0.0)) return;
     sky_table_.emplace(weights);
+    sky_density_.resize(weights.size());
+    for (std::size_t texel = 0; texel < weights.size(); ++texel) {
+        const int y = static_cast<int>(texel / static_cast<std::size_t>(width));
+        sky_density_[texel] = static_cast<float>(sky_table_->probability(texel) /
+                                                 environmentTexelSolidAngle(width, height, y));
+    }
     sky_brightness_ = total / (4.0 * pi);
 }
 
@@ -156,7 +162,7 @@ double EnvironmentLight::skyPdf(glm::dvec3 direction) const
     const int y = std::clamp(static_cast<int>(uv.y * height), 0, height - 1);
     const std::size_t texel =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-    return sky_table_->probability(texel) / environmentTexelSolidAngle(width, height, y);
+    return static_cast<double>(sky_density_[texel]);
 }
 
 glm::dvec3 EnvironmentLight::drawSky(double u, double v) const

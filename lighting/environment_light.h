@@ -89,7 +89,8 @@ private:
 
     EnvironmentMap environment_;
     std::optional<AliasTable> sky_table_;
-    double sky_brightness_ = 0.0;  ///< mean luminance over the sphere
+    std::vector<float> sky_density_;  ///< per texel, of a drawn direction per solid angle
+    double sky_brightness_ = 0.0;     ///< mean luminance over the sphere
     std::vector<AreaLamp> lamps_;
     std::vector<Target> targets_;  ///< portals, then lamps
     std::size_t portal_count_ = 0;
