@@ -1,5 +1,6 @@
 #include "calib/camera_solve.h"
 
+#include "calib/lens_distortion.h"
 #include "calib/metric_scale.h"
 #include "calib/orientation.h"
 #include "core/check.h"
@@ -306,12 +307,13 @@ std::array<std::optional<glm::dvec2>, 3> vanishingPoints(const LineSet& lines,
 
 }  // namespace
 
-CameraEstimate calibrateCamera(const LineSet& lines,
+CameraEstimate calibrateCamera(const LineSet& marked,
                                const CalibrationOptions& options,
                                const std::string& source)
 {
     checkOptions(options);
-    lines.check(source);
+    marked.check(source);
+    const LineSet lines = straightened(marked, source);
     checkAxes(lines, source);
     const glm::dvec2 principal_px = glm::dvec2(lines.width, lines.height) * 0.5;
 
@@ -343,6 +345,7 @@ CameraEstimate calibrateCamera(const LineSet& lines,
         std::sqrt(sum / static_cast<double>(orientation.distances_px.size()));
     estimate.vanishing_points_px = vanishingPoints(lines, estimate.camera, axes);
     append(estimate.findings, std::move(place.findings));
+    append(estimate.findings, distortionFindings(marked));
     reportDoubts(lines, choice.solution, estimate);
     return estimate;
 }

@@ -42,7 +42,7 @@ struct CameraEstimate {
 /// Rotation and focal length by maximum likelihood (calib/orientation.h), the EXIF focal length as
 /// a prior; then signs: y points up in the picture, x to the right in it, z = x × y (towards the
 /// viewer); then the place (calib/metric_scale.h). Square pixels, principal point in the picture's
-/// middle, no distortion.
+/// middle; marked points are straightened first when the LineSet says how the lens bends lines.
 ///
 /// Findings:
 ///   principal-point-assumed     always: the picture's middle is taken
@@ -55,12 +55,13 @@ struct CameraEstimate {
 ///                               worse than 5 % of the distance to the origin
 ///   axis-sign-ambiguous         x runs so nearly along the view that "right" is a matter of luck
 ///   scale-disagrees             see calib/metric_scale.h
+///   lens-distortion-approximated  see calib/lens_distortion.h
 /// Throws InputError for a broken LineSet, NoAnswerError (naming `source`) when the lines admit no
 /// camera: a single axis, too few segments, an open focal length without EXIF, lines of an axis
 /// that do not meet in a direction perpendicular to the others, y segments that run horizontally,
 /// an origin above the horizon, no scale.
 /// Source: [GibCha03] section 3 eq. 1, [CapTor90]; refined by least squares on end points.
-[[nodiscard]] CameraEstimate calibrateCamera(const LineSet& lines,
+[[nodiscard]] CameraEstimate calibrateCamera(const LineSet& marked,
                                              const CalibrationOptions& options,
                                              const std::string& source);
 

@@ -15,6 +15,8 @@ namespace {
 constexpr double kMaxPictureSizes = 100.0;
 /// A shorter segment has no direction worth the name.
 constexpr double kMinLengthPx = 1.0;
+/// Half a picture's diagonal shrunk to two thirds: more is a fish-eye, which this model is not for.
+constexpr double kMaxDivision = 0.5;
 
 void checkPoint(glm::dvec2 point,
                 const LineSet& lines,
@@ -116,6 +118,14 @@ void LineSet::check(const std::string& source) const
     }
     if (camera_height_m && (!(*camera_height_m > 0.0) || !std::isfinite(*camera_height_m)))
         throw InputError(source, "scale.camera_height_m", "must be a positive number of metres");
+    if (!std::isfinite(distortion.division) || std::abs(distortion.division) > kMaxDivision)
+        throw InputError(
+            source, "distortion.division", fmt::format("must lie within ±{}", kMaxDivision));
+    if (!(distortion.unchanged_radius_px >= 0.0) ||
+        distortion.unchanged_radius_px > 0.5 * std::hypot(width, height))
+        throw InputError(source,
+                         "distortion.unchanged_radius_px",
+                         "must lie between 0 and half the picture's diagonal");
     if (!(camera_height_sigma_m >= 0.0) || !std::isfinite(camera_height_sigma_m))
         throw InputError(source, "scale.camera_height_sigma_m", "must be >= 0 metres");
 }
@@ -124,7 +134,7 @@ LineSet readLineSet(const std::filesystem::path& path)
 {
     const Json json = readJson(path);
     const JsonNode root(json, path.string());
-    root.expectKeys({"image", "segments", "origin_px", "scale", "note"});
+    root.expectKeys({"image", "segments", "origin_px", "scale", "distortion", "note"});
     LineSet lines;
     const JsonNode image = root.at("image");
     image.expectKeys({"width", "height"});
@@ -139,6 +149,12 @@ LineSet readLineSet(const std::filesystem::path& path)
     }
     lines.origin_px = root.at("origin_px").vec2();
     readScale(root, lines);
+    if (const auto distortion = root.find("distortion")) {
+        distortion->expectKeys({"division", "unchanged_radius_px"});
+        lines.distortion.division = distortion->at("division").number();
+        if (const auto radius = distortion->find("unchanged_radius_px"))
+            lines.distortion.unchanged_radius_px = radius->number();
+    }
     lines.check(path.string());
     return lines;
 }

@@ -37,6 +37,12 @@ struct KnownLength {
     double metres = 0.0;
 };
 
+/// How far the lens bends lines (calib/lens_distortion.h). The default bends nothing.
+struct MarkedDistortion {
+    double division = 0.0;             ///< λ for r in half diagonals; a barrel is negative
+    double unchanged_radius_px = 0.0;  ///< distance from the middle where the camera is exact
+};
+
 /// What the user marked in the photograph.
 struct LineSet {
     int width = 0;
@@ -46,6 +52,7 @@ struct LineSet {
     std::optional<double> camera_height_m;
     double camera_height_sigma_m = 0.0;  ///< 1σ of camera_height_m, 0 = exact
     std::vector<KnownLength> lengths;
+    MarkedDistortion distortion;
 
     /// Throws InputError (naming `source`) unless sizes are positive, all numbers finite, every
     /// segment at least a pixel long and every length positive.

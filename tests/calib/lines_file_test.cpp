@@ -23,7 +23,8 @@ constexpr const char* kGood = R"({
                {"axis": "y", "from_px": [10, 20], "to_px": [12, 320]}],
   "origin_px": [420, 455],
   "scale": {"camera_height_m": 1.5, "camera_height_sigma_m": 0.01,
-            "lengths": [{"from_px": [1, 500], "to_px": [90, 510], "on": "vertical", "metres": 0.8}]}
+            "lengths": [{"from_px": [1, 500], "to_px": [90, 510], "on": "vertical", "metres": 0.8}]},
+  "distortion": {"division": -0.07, "unchanged_radius_px": 200}
 })";
 
 class LinesFile : public testing::Test {
@@ -79,6 +80,8 @@ TEST_F(LinesFile, ReadsEveryMember)
     ASSERT_EQ(lines.lengths.size(), 1u);
     EXPECT_EQ(lines.lengths[0].on, KnownLength::On::Vertical);
     EXPECT_EQ(lines.lengths[0].metres, 0.8);
+    EXPECT_EQ(lines.distortion.division, -0.07);
+    EXPECT_EQ(lines.distortion.unchanged_radius_px, 200.0);
 }
 
 TEST_F(LinesFile, ComplaintsNameFilePlaceAndCause)
@@ -91,6 +94,10 @@ TEST_F(LinesFile, ComplaintsNameFilePlaceAndCause)
     EXPECT_THAT(complaintAbout(changed("\"metres\": 0.8", "\"metres\": -1")), HasSubstr("metres"));
     EXPECT_THAT(complaintAbout(changed("\"vertical\"", "\"wall\"")),
                 HasSubstr("scale.lengths[0].on"));
+    EXPECT_THAT(complaintAbout(changed("-0.07", "-7")), HasSubstr("distortion.division"));
+    EXPECT_THAT(
+        complaintAbout(changed("\"unchanged_radius_px\": 200", "\"unchanged_radius_px\": 900")),
+        HasSubstr("unchanged_radius_px"));
     EXPECT_THAT(complaintAbout(changed("800", "0")), HasSubstr("image"));
     EXPECT_THAT(complaintAbout(changed("800", "\"wide\"")), HasSubstr("image.width"));
     EXPECT_THAT(complaintAbout("{\"image\": "), HasSubstr("file.json"));
