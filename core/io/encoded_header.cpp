@@ -220,7 +220,7 @@ EncodedHeader parseTiff(const ByteView& file)
                                      "unsigned are read (save linear data as EXR)",
                                      header.bits,
                                      tags.sample_format));
-    if (header.channels < 1 || header.channels > 16)
+    if (header.channels < 1 || header.channels > 4)
         throw InputError(file.path(), fmt::format("has {} channels", header.channels));
     if (tags.tile_width > kMaxTileSide || tags.tile_height > kMaxTileSide)
         throw InputError(
