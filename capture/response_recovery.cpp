@@ -156,11 +156,10 @@ Findings ResponseOptions::validate() const
         findings.push_back({Severity::Error,
                             "response-options",
                             fmt::format("samples is {}, must be at least 50", samples)});
-    if (!(smoothness >= 0.0) || !std::isfinite(smoothness))
-        findings.push_back(
-            {Severity::Error,
-             "response-options",
-             fmt::format("smoothness is {}, must be >= 0 (0: automatic)", smoothness)});
+    if (!(smoothness > 0.0) || !std::isfinite(smoothness))
+        findings.push_back({Severity::Error,
+                            "response-options",
+                            fmt::format("smoothness is {}, must be > 0", smoothness)});
     return findings;
 }
 
@@ -198,7 +197,6 @@ ResponseRecovery recoverResponse(const Bracket& bracket, const ResponseOptions& 
         for (std::size_t z = 0; z < log_curve.size(); ++z)
             recovery.curve.exposure[c][z] = std::exp(log_curve[z] - log_curve[128]);
         recovery.residual[c] = solutions[c].residual;
-        recovery.smoothness[c] = solutions[c].smoothness;
     }
     reportReach(channels, recovery.findings);
     return recovery;

@@ -12,9 +12,9 @@ namespace insitu {
 struct ResponseOptions {
     /// Places of the picture used (small flat patches). Unitless, >= 50.
     int samples = 1500;
-    /// Weight of the curvature penalty ([DebMal97] eq. 3, lambda). Unitless, >= 0; 0 chooses it
-    /// by cross-validation between two halves of the samples.
-    double smoothness = 0.0;
+    /// Weight of the penalty on bends of the curve ([DebMal97] eq. 3, lambda; see
+    /// response_solve.cpp). Unitless, > 0.
+    double smoothness = 30.0;
 
     /// Every problem at once, so that one run reports them all.
     [[nodiscard]] Findings validate() const;
@@ -24,8 +24,6 @@ struct ResponseRecovery {
     ResponseCurve curve;
     /// RMS over samples of ln(exposure) predicted by two frames for one place, per channel.
     std::array<double, 3> residual{};
-    /// The curvature weight used, per channel.
-    std::array<double, 3> smoothness{};
     /// "response-not-recoverable", "response-partly-extrapolated" (codes no sample reached)
     Findings findings;
 };

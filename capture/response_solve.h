@@ -23,11 +23,10 @@ using LogCurve = std::array<double, 256>;
 
 struct ResponseSolution {
     LogCurve log_curve{};
-    double smoothness = 0.0;  ///< the curvature weight used
-    double residual = 0.0;    ///< weighted RMS of ln exposure, see ResponseRecovery
+    double residual = 0.0;  ///< weighted RMS of ln exposure, see ResponseRecovery
 };
 
-/// Solves one channel. `smoothness` 0: by cross-validation. See response_solve.cpp.
+/// Solves one channel; `smoothness` as in ResponseOptions. See response_solve.cpp.
 [[nodiscard]] ResponseSolution solveResponse(const std::vector<PatchObservations>& patches,
                                              double smoothness);
 
