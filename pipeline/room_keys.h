@@ -64,6 +64,7 @@ inline const KeyList kRender = {"samples_per_pixel",
                                 "panorama_width",
                                 "max_bounces",
                                 "roulette_start",
+                                "denoise",
                                 "truth_reduction"};
 
 }  // namespace insitu::keys

@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "pipeline/camera_simulator.h"
+#include "pipeline/denoise.h"
 #include "render/path_tracer.h"
 
 #include <glm/glm.hpp>
@@ -121,6 +122,12 @@ Image<float> renderCoverage(const SimulatedRoom& room, const SimulatedScene& sce
     return coverage;
 }
 
+Image<Rgb> finish(RenderedImage image, const ObjectScene& scene, const SimulatedRoom& room)
+{
+    if (!room.denoise) return std::move(image.radiance);
+    return denoised(image, scene, room.camera);
+}
+
 SimulatedShot takeShot(const SimulatedRoom& room,
                        const SimulatedCapture& capture,
                        const Image<Rgb>& radiance,
@@ -155,9 +162,11 @@ SimulatedTruth renderRoom(const SimulatedRoom& room,
 
     SimulatedTruth truth;
     PartOfProgress plate(progress, 0.0, 0.4);
-    truth.plate = renderScene(scene.without, scene.light, room.camera, options, plate).radiance;
+    truth.plate = finish(
+        renderScene(scene.without, scene.light, room.camera, options, plate), scene.without, room);
     PartOfProgress with(progress, 0.4, 0.8);
-    truth.with = renderScene(scene.with, scene.light, room.camera, options, with).radiance;
+    truth.with =
+        finish(renderScene(scene.with, scene.light, room.camera, options, with), scene.with, room);
     truth.coverage = renderCoverage(room, scene);
 
     const Camera camera =

@@ -292,6 +292,7 @@ void readRender(const JsonNode& node, SimulatedRoom& room)
     count("panorama_width", room.panorama_width, 4, kMaxSide);
     count("max_bounces", room.max_bounces, 1, 1000);
     count("roulette_start", room.roulette_start, 0, 1000);
+    if (const auto v = node.find("denoise")) room.denoise = v->boolean();
     count("truth_reduction", room.truth_reduction, 1, 64);
 }
 

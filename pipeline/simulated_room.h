@@ -115,6 +115,7 @@ struct SimulatedRoom {
     int panorama_width = 512;
     int max_bounces = 12;
     int roulette_start = 2;   ///< bounces before paths may end by chance, >= 0
+    bool denoise = false;     ///< plate and truth: see pipeline/denoise.h
     int truth_reduction = 1;  ///< linear truth pictures are written this much smaller
     std::uint64_t seed = 1;
 };
