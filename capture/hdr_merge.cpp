@@ -10,7 +10,7 @@
 #include <cmath>
 
 // Every frame k that is good at a pixel estimates its radiance as x_k / t_k, x the linearised
-// exposure. The best linear mean has weights t_k^2 / var(x_k) [Granados10 eq. 3]. The variance is
+// exposure. The best linear mean has weights t_k^2 / var(x_k) [Granados10], section 3. The variance is
 // that of a common small sensor, in units of full scale, plus rounding to codes; only ratios
 // between frames matter. It is taken at the exposure predicted from the longest good frame, not
 // at x_k itself: weights that depend on a frame's own noise prefer the dark deviations.
