@@ -20,8 +20,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int kMaxDepth = 64;
-// tinygltf keeps up to some 500 bytes for one value of JSON.
-constexpr std::int64_t kMaxJsonValues = 4'000'000;
+// tinygltf keeps up to some 600 bytes for one value of JSON; furniture has a few thousand values.
+constexpr std::int64_t kMaxJsonValues = 1'000'000;
 
 /// The JSON text of a glTF file and the length of its binary chunk.
 struct Container {
@@ -62,22 +62,61 @@ Container openBinary(std::span<const std::uint8_t> bytes, const std::string& pat
     return result;
 }
 
+/// Walks the JSON without building it, to bound what building it would take.
+class JsonGuard : public nlohmann::json_sax<Json> {
+public:
+    explicit JsonGuard(const std::string& path) : path_(path) {}
+
+    bool null() override { return count(); }
+    bool boolean(bool) override { return count(); }
+    bool number_integer(Json::number_integer_t) override { return count(); }
+    bool number_unsigned(Json::number_unsigned_t) override { return count(); }
+    bool number_float(Json::number_float_t, const std::string&) override { return count(); }
+    bool string(std::string&) override { return count(); }
+    bool binary(Json::binary_t&) override { return count(); }
+    bool key(std::string&) override { return true; }
+    bool start_object(std::size_t) override { return enter(); }
+    bool end_object() override { return leave(); }
+    bool start_array(std::size_t) override { return enter(); }
+    bool end_array() override { return leave(); }
+    bool parse_error(std::size_t position,
+                     const std::string&,
+                     const nlohmann::detail::exception& error) override
+    {
+        throw InputError(
+            path_, fmt::format("byte {}", position), fmt::format("bad JSON: {}", error.what()));
+    }
+
+private:
+    bool count()
+    {
+        if (++values_ > kMaxJsonValues)
+            throw InputError(path_, fmt::format("more than {} JSON values", kMaxJsonValues));
+        return true;
+    }
+    bool enter()
+    {
+        if (++depth_ > kMaxDepth) throw InputError(path_, "its JSON is nested too deeply");
+        return count();
+    }
+    bool leave()
+    {
+        --depth_;
+        return true;
+    }
+
+    const std::string& path_;
+    std::int64_t values_ = 0;
+    int depth_ = 0;
+};
+
 Json parseJson(std::span<const std::uint8_t> text, const std::string& path)
 {
-    std::int64_t values = 0;
-    const auto guard = [&](int depth, Json::parse_event_t, Json&) {
-        if (depth > kMaxDepth) throw InputError(path, "its JSON is nested too deeply");
-        if (++values > kMaxJsonValues)
-            throw InputError(path, fmt::format("more than {} JSON values", kMaxJsonValues));
-        return true;
-    };
-    try {
-        Json json = Json::parse(text.begin(), text.end(), guard);
-        if (!json.is_object()) throw InputError(path, "its JSON is not an object");
-        return json;
-    } catch (const Json::exception& error) {
-        throw InputError(path, fmt::format("bad JSON: {}", error.what()));
-    }
+    JsonGuard guard(path);
+    Json::sax_parse(text.begin(), text.end(), &guard);
+    Json json = Json::parse(text.begin(), text.end());
+    if (!json.is_object()) throw InputError(path, "its JSON is not an object");
+    return json;
 }
 
 const Json& member(const Json& object, const char* key)

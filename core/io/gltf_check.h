@@ -23,7 +23,7 @@ struct GltfOutline {
 };
 
 /// Checks container, JSON and what tinygltf takes on trust: chunk lengths; nesting (at most 64) and
-/// number of JSON values (at most 4 million); glTF version 2; buffer sizes (sum at most
+/// number of JSON values (at most 1 million); glTF version 2; buffer sizes (sum at most
 /// kMaxModelBytes) and the ranges of images inside buffers.
 ///
 /// InputError names the cause, and each entry of `extensionsRequired` that is not implemented.

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 namespace insitu {
@@ -62,8 +61,8 @@ glm::dmat3 normalMatrix(const glm::dmat3& m)
             sign * glm::cross(m[0], m[1])};
 }
 
-/// Corner numbers of the triangles of one primitive; nothing for points and lines.
-std::optional<std::vector<glm::uvec3>> trianglesOf(int mode, const std::vector<std::uint32_t>& v)
+/// Corner numbers of the triangles of one primitive.
+std::vector<glm::uvec3> trianglesOf(int mode, const std::vector<std::uint32_t>& v)
 {
     std::vector<glm::uvec3> triangles;
     switch (mode) {
@@ -81,7 +80,7 @@ std::optional<std::vector<glm::uvec3>> trianglesOf(int mode, const std::vector<s
                 triangles.emplace_back(v[i], v[i + 1], v[0]);
             return triangles;
         default:
-            return std::nullopt;
+            return triangles;
     }
 }
 
@@ -148,6 +147,8 @@ public:
             for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
                 open.push_back({*child, model_from_node});
         }
+        for (const auto& [primitive, model_from_node] : instances_)
+            append(readPart(*primitive), model_from_node);
         if (!any_normals_) model_.mesh.normals.clear();
         if (!any_texcoords_) model_.mesh.texcoords.clear();
         report();
@@ -182,29 +183,35 @@ private:
             addPrimitive(primitive, model_from_node);
     }
 
+    // Instances share a mesh, so a small file could ask for any amount: sizes are added up before
+    // anything is read.
     void addPrimitive(const tinygltf::Primitive& primitive, const glm::dmat4& model_from_node)
     {
-        const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+        const int mode = modeOf(primitive);
         const auto positions = primitive.attributes.find("POSITION");
         if (mode < TINYGLTF_MODE_TRIANGLES || mode > TINYGLTF_MODE_TRIANGLE_FAN ||
             positions == primitive.attributes.end()) {
             ++skipped_primitives_;
             return;
         }
-        // Instances share a mesh, so a small file could ask for any amount.
-        const int sizing = primitive.indices >= 0 ? primitive.indices : positions->second;
-        elements_ +=
-            accessorCount(gltf_, positions->second, path_) + accessorCount(gltf_, sizing, path_);
-        if (elements_ > 2 * kMaxElements)
+        const int corners = primitive.indices >= 0 ? primitive.indices : positions->second;
+        elements_ += accessorCount(gltf_, positions->second, path_) +
+                     3 * accessorCount(gltf_, corners, path_);
+        if (elements_ > 4 * kMaxElements)
             throw InputError(path_, fmt::format("more than {} vertices", kMaxElements));
         has_colors_ |= primitive.attributes.contains("COLOR_0");
-        append(readPart(primitive, mode, positions->second), model_from_node);
+        instances_.emplace_back(&primitive, model_from_node);
     }
 
-    Part readPart(const tinygltf::Primitive& primitive, int mode, int positions)
+    static int modeOf(const tinygltf::Primitive& primitive)
+    {
+        return primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+    }
+
+    Part readPart(const tinygltf::Primitive& primitive)
     {
         Part part;
-        part.positions = readVec3Accessor(gltf_, positions, path_);
+        part.positions = readVec3Accessor(gltf_, primitive.attributes.at("POSITION"), path_);
         part.material = materials_.materialOf(primitive.material);
         std::vector<std::uint32_t> corners;
         if (primitive.indices >= 0) {
@@ -221,7 +228,7 @@ private:
             for (std::size_t i = 0; i < corners.size(); ++i)
                 corners[i] = static_cast<std::uint32_t>(i);
         }
-        part.triangles = *trianglesOf(mode, corners);
+        part.triangles = trianglesOf(modeOf(primitive), corners);
 
         const auto texcoords = primitive.attributes.find(
             fmt::format("TEXCOORD_{}", materials_.texcoordSetOf(primitive.material)));
@@ -291,6 +298,7 @@ private:
     const std::string& path_;
     GltfMaterials& materials_;
     Model& model_;
+    std::vector<std::pair<const tinygltf::Primitive*, glm::dmat4>> instances_;
     std::size_t elements_ = 0;
     std::size_t skipped_primitives_ = 0;
     bool any_normals_ = false;

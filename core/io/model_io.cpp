@@ -1,9 +1,10 @@
 #include "core/io/model_io.h"
 
 #include "core/check.h"
-#include "core/io/assimp_reader.h"
 #include "core/io/gltf_reader.h"
 #include "core/io/obj_reader.h"
+#include "core/io/ply_reader.h"
+#include "core/io/stl_reader.h"
 
 #include <algorithm>
 #include <cctype>
@@ -27,10 +28,11 @@ Model readByExtension(const std::filesystem::path& path)
     const std::string extension = lowerExtension(path);
     if (extension == ".obj") return readObj(path);
     if (extension == ".gltf" || extension == ".glb") return readGltf(path);
-    if (isAssimpFormat(extension)) return readWithAssimp(path);
+    if (extension == ".ply") return readPly(path);
+    if (extension == ".stl") return readStl(path);
     throw InputError(path.string(),
                      fmt::format("'{}' is no model format that is read; use .gltf, .glb, .obj, "
-                                 ".ply, .stl, .dae or .fbx",
+                                 ".ply or .stl (Blender converts most others)",
                                  extension));
 }
 

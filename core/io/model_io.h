@@ -6,7 +6,11 @@
 
 namespace insitu {
 
-/// Loads a model by extension: .gltf/.glb through tinygltf; .obj and the rest through assimp.
+/// Loads a model by extension: .gltf and .glb (through tinygltf), .obj, .ply and .stl.
+///
+/// Readers are our own, and tinygltf sees only what was checked before: assimp 5.2, the obvious
+/// choice for these and for .dae and .fbx, crashes on damaged PLY and DAE files and forgets OBJ
+/// smoothing groups. Other formats are an InputError that says what to use.
 ///
 /// The result is validated (validateMesh) and in the file's own units and axes. glTF: node
 /// transforms applied (negative scales flip the winding), base-colour and metallic-roughness

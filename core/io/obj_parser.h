@@ -51,7 +51,11 @@ struct ObjFile {
 /// One line of a text in OBJ syntax, cut into words: comments and line continuations are resolved.
 class ObjLines {
 public:
-    explicit ObjLines(std::string_view text) : rest_(text) {}
+    explicit ObjLines(std::string_view text) : rest_(text)
+    {
+        constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+        if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
+    }
 
     /// Goes to the next line that holds a word; false at the end.
     [[nodiscard]] bool next();
