@@ -13,10 +13,13 @@ using RegisterCommand = void (*)(CLI::App&, Context&);
 
 /// Every command, in the order of the help text: the order in which a project uses them.
 constexpr RegisterCommand kCommands[] = {
+    registerMerge,
+    registerProbe,
     registerCalibrate,
     registerInsert,
     registerTonemap,
     registerCompare,
+    registerInfo,
     registerSimulate,
 };
 
