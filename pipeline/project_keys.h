@@ -10,7 +10,7 @@ namespace insitu::keys {
 using KeyList = std::initializer_list<std::string_view>;
 
 inline const KeyList kProject = {
-    "format", "version", "photo", "camera", "light", "room", "objects"};
+    "format", "version", "photo", "camera", "light", "room", "objects", "note"};
 inline const KeyList kImage = {"image", "exposure_seconds", "f_number", "iso"};
 inline const KeyList kCamera = {"lines", "file"};
 inline const KeyList kLight = {"probe", "environment", "center_m"};

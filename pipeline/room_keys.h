@@ -19,7 +19,8 @@ inline const KeyList kSimulatedRoom = {"format",
                                        "photography",
                                        "lines",
                                        "render",
-                                       "seed"};
+                                       "seed",
+                                       "note"};
 inline const KeyList kSimulatedBox = {"min_m", "max_m", "surfaces"};
 inline const KeyList kSurfaces = {"floor", "ceiling", "left", "right", "back", "front"};
 inline const KeyList kSurface = {

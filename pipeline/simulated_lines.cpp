@@ -136,7 +136,8 @@ LineSet markedLines(const SimulatedRoom& room, const std::vector<LineSegment>& e
     RandomStream random(room.seed, ~std::uint64_t{0}, 0);
     const auto marked = [&](glm::dvec2 pixel) {
         const double x = pixel.x + room.line_noise_px * random.normal();
-        return glm::dvec2(x, pixel.y + room.line_noise_px * random.normal());
+        const double y = pixel.y + room.line_noise_px * random.normal();
+        return glm::clamp(glm::dvec2(x, y), glm::dvec2(0.0), glm::dvec2(lines.width, lines.height));
     };
     for (const LineSegment& edge : edges)
         lines.segments.push_back({edge.axis, marked(edge.from_px), marked(edge.to_px)});
