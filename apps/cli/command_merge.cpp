@@ -1,0 +1,50 @@
+#include "apps/cli/bracket_input.h"
+#include "apps/cli/command.h"
+#include "core/io/image_io.h"
+#include "core/io/json.h"
+
+namespace insitu::cli {
+
+namespace {
+
+struct MergeArguments {
+    BracketArguments bracket;
+    std::filesystem::path output;
+    std::filesystem::path save_response;
+};
+
+void runMerge(const MergeArguments& arguments, Context& context)
+{
+    context.start();
+    context.checkOutput(arguments.output);
+    if (!arguments.save_response.empty()) context.checkOutput(arguments.save_response);
+    if (!isRadianceFile(arguments.output))
+        throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
+    const BracketRadiance result = mergeArguments(arguments.bracket, context);
+    writeRadiance(arguments.output, result.merged.radiance.pixels);
+    if (!arguments.save_response.empty())
+        writeJson(arguments.save_response, toJson(result.response));
+}
+
+}  // namespace
+
+void registerMerge(CLI::App& app, Context& context)
+{
+    auto arguments = std::make_shared<MergeArguments>();
+    CLI::App* command =
+        app.add_subcommand("merge", "Merge bracketed exposures into one radiance image");
+    addBracketOptions(*command, arguments->bracket);
+    command
+        ->add_option("-o,--output", arguments->output, "Radiance image to write (.exr, .hdr, .pfm)")
+        ->required();
+    command->add_option(
+        "--save-response", arguments->save_response, "Write the response curve (.json)");
+    context.addCommonOptions(*command);
+    command->footer(
+        "Examples:\n"
+        "  insitu merge IMG_1.jpg IMG_2.jpg IMG_3.jpg -o room.exr --save-response camera.json\n"
+        "  insitu merge a.png b.png --exposures 1/60,1/15 --response camera.json -o room.exr");
+    command->callback([arguments, &context] { runMerge(*arguments, context); });
+}
+
+}  // namespace insitu::cli

@@ -1,0 +1,154 @@
+#include "apps/cli/bracket_input.h"
+#include "apps/cli/command.h"
+#include "capture/light_probe.h"
+#include "core/io/image_io.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+namespace insitu::cli {
+
+namespace {
+
+struct ProbeArguments {
+    BracketArguments bracket;
+    std::filesystem::path output;
+    std::string kind = "mirror-ball";
+    std::optional<std::array<double, 2>> center_px;
+    std::optional<double> radius_px;
+    double radius_m = 0.05;
+    double reflectance = 1.0;
+    std::array<double, 3> position_m = {0.0, 0.0, 0.0};
+    std::optional<std::array<double, 3>> view_position_m;
+    int width = 0;
+};
+
+glm::dvec3 toVec3(const std::array<double, 3>& v)
+{
+    return {v[0], v[1], v[2]};
+}
+
+/// One radiance file, or a bracket to be merged.
+Image<Rgb> readProbeRadiance(const ProbeArguments& arguments, Context& context)
+{
+    const auto& images = arguments.bracket.images;
+    if (images.size() == 1 && isRadianceFile(images.front()))
+        return readRadiance(images.front()).pixels;
+    return mergeArguments(arguments.bracket, context).merged.radiance.pixels;
+}
+
+/// What was not given is taken from the usual crop: the ball fills the picture, seen from +z.
+LightProbe unwrapBall(const Image<Rgb>& radiance, const ProbeArguments& arguments)
+{
+    MirrorBall ball;
+    ball.center_px = 0.5 * glm::dvec2(radiance.width(), radiance.height());
+    if (arguments.center_px)
+        ball.center_px = {(*arguments.center_px)[0], (*arguments.center_px)[1]};
+    ball.radius_px =
+        arguments.radius_px.value_or(0.5 * std::min(radiance.width(), radiance.height()));
+    ball.radius_m = arguments.radius_m;
+    ball.reflectance = arguments.reflectance;
+    ball.center_m = toVec3(arguments.position_m);
+    Findings assumed;
+    if (!arguments.center_px || !arguments.radius_px)
+        assumed.push_back({Severity::Info,
+                           "probe-outline-assumed",
+                           fmt::format("the ball's outline is taken as centre ({}, {}), radius {} "
+                                       "px; give --center and --radius",
+                                       ball.center_px.x,
+                                       ball.center_px.y,
+                                       ball.radius_px)});
+    glm::dvec3 view = ball.center_m + glm::dvec3(0.0, 0.0, 20.0 * ball.radius_m);
+    if (arguments.view_position_m)
+        view = toVec3(*arguments.view_position_m);
+    else
+        assumed.push_back({Severity::Info,
+                           "probe-view-assumed",
+                           fmt::format("the camera is taken to be {} m from the ball on its +z "
+                                       "side; give --view-position",
+                                       20.0 * ball.radius_m)});
+    const Camera camera = ballCamera(ball, view, radiance.width(), radiance.height());
+    UnwrapOptions options;
+    options.width = arguments.width;
+    LightProbe probe = unwrapMirrorBall(radiance, ball, camera, options);
+    append(assumed, std::move(probe.findings));
+    probe.findings = std::move(assumed);
+    return probe;
+}
+
+void runProbe(const ProbeArguments& arguments, Context& context)
+{
+    context.start();
+    context.checkOutput(arguments.output);
+    if (!isRadianceFile(arguments.output))
+        throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
+    const Image<Rgb> radiance = readProbeRadiance(arguments, context);
+    LightProbe probe;
+    if (arguments.kind == "latlong")
+        probe = probeFromLatLong(radiance, arguments.width);
+    else if (arguments.kind == "angular")
+        probe = probeFromAngularMap(radiance, arguments.width);
+    else
+        probe = unwrapBall(radiance, arguments);
+    context.print(probe.findings);
+    writeRadiance(arguments.output, probe.environment.pixels);
+}
+
+void addBallOptions(CLI::App& command, ProbeArguments& arguments)
+{
+    command
+        .add_option("--center",
+                    arguments.center_px,
+                    "Centre of the ball's outline, x,y in pixels (default: the picture's)")
+        ->delimiter(',');
+    command
+        .add_option("--radius",
+                    arguments.radius_px,
+                    "Radius of the ball's outline in pixels (default: it fills the picture)")
+        ->check(CLI::PositiveNumber);
+    command.add_option("--radius-m", arguments.radius_m, "Radius of the ball in metres")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command.add_option("--reflectance", arguments.reflectance, "Reflectance of the ball")
+        ->check(CLI::Range(0.01, 1.0))
+        ->capture_default_str();
+    command
+        .add_option(
+            "--position", arguments.position_m, "Centre of the ball in the room, x,y,z in metres")
+        ->delimiter(',')
+        ->capture_default_str();
+    command
+        .add_option("--view-position",
+                    arguments.view_position_m,
+                    "Where the camera was, x,y,z in metres, Y up (default: on the +z side)")
+        ->delimiter(',');
+}
+
+}  // namespace
+
+void registerProbe(CLI::App& app, Context& context)
+{
+    auto arguments = std::make_shared<ProbeArguments>();
+    CLI::App* command = app.add_subcommand(
+        "probe", "Turn pictures of a light probe into an equirectangular environment");
+    addBracketOptions(*command, arguments->bracket);
+    command->add_option("-o,--output", arguments->output, "Environment to write (.exr, .hdr, .pfm)")
+        ->required();
+    command->add_option("--kind", arguments->kind, "mirror-ball, angular or latlong")
+        ->check(CLI::IsMember({"mirror-ball", "angular", "latlong"}))
+        ->capture_default_str();
+    addBallOptions(*command, *arguments);
+    command->add_option("--width", arguments->width, "Width of the environment (0: automatic)")
+        ->check(CLI::Range(0, 16384))
+        ->capture_default_str();
+    context.addCommonOptions(*command);
+    command->footer(
+        "Examples:\n"
+        "  insitu probe ball.exr -o env.exr --center 300,300 --radius 260.8\n"
+        "  insitu probe ball_1.jpg ball_2.jpg ball_3.jpg -o env.exr --radius-m 0.06\n"
+        "  insitu probe angular.hdr --kind angular -o env.exr --width 1024");
+    command->callback([arguments, &context] { runProbe(*arguments, context); });
+}
+
+}  // namespace insitu::cli
