@@ -10,8 +10,8 @@
 #include <cmath>
 
 // Every frame k that is good at a pixel estimates its radiance as x_k / t_k, x the linearised
-// exposure. The best linear mean has weights t_k^2 / var(x_k) [Granados10], section 3. The variance is
-// that of a common small sensor, in units of full scale, plus rounding to codes; only ratios
+// exposure. The best linear mean has weights t_k^2 / var(x_k) [Granados10], section 3. The variance
+// is that of a common small sensor, in units of full scale, plus rounding to codes; only ratios
 // between frames matter. It is taken at the exposure predicted from the longest good frame, not
 // at x_k itself: weights that depend on a frame's own noise prefer the dark deviations.
 
@@ -28,12 +28,16 @@ constexpr double kCodeVariance = 1.0 / 12.0;
 /// twice the black limit above it: otherwise steps in radiance show where a frame drops out.
 constexpr double kFadeFraction = 0.06;
 
+/// Beside a clipped channel, codes above this fraction count as clipped too.
+constexpr double kSuspectFraction = 0.8;
+
 /// One frame, ready for look-ups.
 struct FrameView {
     const EncodedImage* image;
     double exposure;
     double to_255;
     int clip_code;
+    int suspect_code;
     int black_code;
 };
 
@@ -54,6 +58,7 @@ public:
                                frame.relative_exposure,
                                255.0 / top,
                                static_cast<int>(std::floor(options.clip_fraction * top)),
+                               static_cast<int>(kSuspectFraction * top),
                                static_cast<int>(std::ceil(options.black_fraction * top))});
         }
     }
@@ -78,9 +83,14 @@ private:
     {
         return frame.image->codes(x, y)[c];
     }
-    [[nodiscard]] static bool isClipped(const FrameView& frame, int code_value)
+    /// Where one channel is clipped, a JPEG may show another clipped one as somewhat less: it
+    /// shares colour between neighbours. So the others count as clipped early.
+    [[nodiscard]] static bool isClipped(const FrameView& frame, int x, int y, int c)
     {
-        return code_value > frame.clip_code;
+        const glm::u16vec3 codes = frame.image->codes(x, y);
+        if (codes[c] > frame.clip_code) return true;
+        const int brightest = std::max({codes.r, codes.g, codes.b});
+        return brightest > frame.clip_code && codes[c] > frame.suspect_code;
     }
 
     /// Beside a clipped pixel the codes may be off: ringing and shared colour of JPEG, blooming.
@@ -90,16 +100,16 @@ private:
         for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, codes.height() - 1); ++ny) {
             for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, codes.width() - 1); ++nx) {
                 const glm::u16vec3 neighbour = codes(nx, ny);
-                for (int c = 0; c < 3; ++c)
-                    if (isClipped(frame, neighbour[c])) return true;
+                if (std::max({neighbour.r, neighbour.g, neighbour.b}) > frame.clip_code)
+                    return true;
             }
         }
         return false;
     }
 
-    [[nodiscard]] bool isGood(const FrameView& frame, int code_value) const
+    [[nodiscard]] static bool isGood(const FrameView& frame, int x, int y, int c)
     {
-        return !isClipped(frame, code_value) && code_value >= frame.black_code;
+        return !isClipped(frame, x, y, c) && code(frame, x, y, c) >= frame.black_code;
     }
 
     [[nodiscard]] double radianceOf(const FrameView& frame, int channel, int code_value) const
@@ -128,39 +138,52 @@ private:
         return std::max(fade, 1e-6) * frame.exposure * frame.exposure / variance;
     }
 
-    /// No frame is good: the longest one that is not clipped, else the shortest (a lower bound).
-    [[nodiscard]] double fallback(int x, int y, int c, bool& clipped, bool& black) const
+    /// The longest frame that is not clipped here: the best evidence of all, good or black.
+    [[nodiscard]] const FrameView* longestUnclipped(int x, int y, int c) const
     {
-        for (const FrameView& frame : frames_) {
-            const int value = code(frame, x, y, c);
-            if (isClipped(frame, value)) continue;
-            black = &frame == &frames_.front();
-            return radianceOf(frame, c, value);
-        }
-        clipped = true;
-        return radianceOf(frames_.back(), c, code(frames_.back(), x, y, c));
+        for (const FrameView& frame : frames_)
+            if (!isClipped(frame, x, y, c)) return &frame;
+        return nullptr;
+    }
+
+    /// Could `frame` show this radiance well above black? If not, a code above black is noise: it
+    /// must not speak for the pixel, however little the other frames are trusted.
+    [[nodiscard]] bool reaches(const FrameView& frame, int c, double radiance) const
+    {
+        const double least = response_.decode(c, 2.0 * frame.black_code * frame.to_255);
+        return radiance * frame.exposure >= least;
     }
 
     [[nodiscard]] double mergeChannel(int x, int y, int c, bool& clipped, bool& black) const
     {
+        const FrameView* longest = longestUnclipped(x, y, c);
+        if (longest == nullptr) {
+            clipped = true;
+            return radianceOf(frames_.back(), c, code(frames_.back(), x, y, c));
+        }
+        const int longest_code = code(*longest, x, y, c);
+        const double predicted = radianceOf(*longest, c, longest_code);
+        if (!isGood(*longest, x, y, c)) {
+            black = longest == &frames_.front();
+            return predicted;
+        }
+
         // Good frames away from clipped pixels; only when there is none, those beside them.
         for (const bool beside_allowed : {false, true}) {
             double sum = 0.0;
             double weights = 0.0;
-            double predicted = -1.0;
             for (const FrameView& frame : frames_) {
-                const int value = code(frame, x, y, c);
-                if (!isGood(frame, value)) continue;
+                if (!isGood(frame, x, y, c)) continue;
+                if (&frame != longest && !reaches(frame, c, predicted)) continue;
                 if (!beside_allowed && besideClipped(frame, x, y)) continue;
-                const double radiance = radianceOf(frame, c, value);
-                if (predicted < 0.0) predicted = radiance;
+                const int value = code(frame, x, y, c);
                 const double w = weight(frame, c, value, predicted);
-                sum += w * radiance;
+                sum += w * radianceOf(frame, c, value);
                 weights += w;
             }
             if (weights > 0.0) return sum / weights;
         }
-        return fallback(x, y, c, clipped, black);
+        return predicted;
     }
 
     const ResponseCurve& response_;

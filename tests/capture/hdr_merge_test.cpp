@@ -134,6 +134,16 @@ TEST(MergeBracket, UsesPixelsBesideClippedOnesWhenNothingElseIsGood)
     EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 1600.0f / 65536.0f / 1024.0f);
 }
 
+// Dark, beside a lamp that clips the long frame: the short frame's code is noise and would mean a
+// radiance a thousand times too high.
+TEST(MergeBracket, DoesNotTakeNoiseInAShortFrameForLight)
+{
+    const Bracket bracket =
+        makeBracket({frameOf({60, 255, 100}, 1024.0), frameOf({9, 200, 2}, 1.0)});
+    const MergeResult merged = mergeBracket(bracket, squares(), {});
+    EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 3600.0f / 65536.0f / 1024.0f);
+}
+
 // Weights t^2/var: the mean over many noisy pixels is unbiased and its spread is near that of the
 // longest unclipped frame, not of the noisiest.
 TEST(MergeBracket, IsUnbiasedAndAsQuietAsTheBestFrame)
