@@ -187,32 +187,29 @@ Image<glm::dvec3> blockMeans(const Image<Rgb>& map)
     return means;
 }
 
-struct ErrorPair {
+struct Pairs {
     std::vector<double> measured;
     std::vector<double> truth;
     std::vector<double> weight;
 
-    /// Errors relative to the truth (to a tenth of its mean where it is darker), after the one
-    /// scale that makes them least.
+    /// Errors relative to the truth (to a tenth of its mean where it is darker), after one scale:
+    /// the median of truth / measured, which a few displaced lights cannot pull.
     [[nodiscard]] std::vector<double> errors() const
     {
         double mean = 0.0;
         double weights = 0.0;
+        std::vector<double> ratios;
         for (std::size_t i = 0; i < truth.size(); ++i) {
             mean += weight[i] * truth[i];
             weights += weight[i];
+            ratios.push_back(truth[i] / measured[i]);
         }
         const double least = 0.1 * mean / weights;
-        double up = 0.0;
-        double down = 0.0;
-        for (std::size_t i = 0; i < measured.size(); ++i) {
-            const double m = measured[i] / std::max(truth[i], least);
-            up += weight[i] * m * truth[i] / std::max(truth[i], least);
-            down += weight[i] * m * m;
-        }
+        std::ranges::nth_element(ratios, ratios.begin() + ratios.size() / 2);
+        const double scale = ratios[ratios.size() / 2];
         std::vector<double> result;
         for (std::size_t i = 0; i < measured.size(); ++i)
-            result.push_back((measured[i] * up / down - truth[i]) / std::max(truth[i], least));
+            result.push_back((measured[i] * scale - truth[i]) / std::max(truth[i], least));
         return result;
     }
 };
@@ -226,7 +223,7 @@ void printProbeError(const std::string& title, const EnvironmentMap& map, const 
     std::string light;
     double total = 0.0;
     for (int c = 0; c < 3; ++c) {
-        ErrorPair texels;
+        Pairs texels;
         for (int y = 0; y < a.height(); ++y) {
             for (int x = 0; x < a.width(); ++x) {
                 texels.measured.push_back(a(x, y)[c]);
@@ -248,7 +245,7 @@ void printProbeError(const std::string& title, const EnvironmentMap& map, const 
                                 100.0 * std::sqrt(squares / weights),
                                 100.0 * sizes[sizes.size() / 2]);
 
-        ErrorPair normals;
+        Pairs normals;
         for (int axis = 0; axis < 3; ++axis) {
             for (const double sign : {1.0, -1.0}) {
                 glm::dvec3 normal(0.0);
