@@ -48,7 +48,7 @@ struct LightProbe {
 /// Mirror-ball picture (radiance) -> equirectangular environment, exact for a ball at finite
 /// distance; every texel is an average over its solid angle. The blind spot behind the ball takes
 /// the radiance at the ball's rim nearest in direction; finding "probe-blind-spot" (share of the
-/// sphere). The outermost pixel of the outline mixes ball and background and is not used.
+/// sphere). The outermost 1.25 pixels of the outline mix ball and background and are not used.
 ///
 /// The ball's outline as `camera` sees it is moved and scaled onto the measured one (center_px,
 /// radius_px), which takes out small errors of the camera; when they differ by more than 2 % of

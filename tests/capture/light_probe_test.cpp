@@ -293,7 +293,7 @@ TEST(UnwrapMirrorBall, FillsTheBlindSpotFromTheRimWithoutBackground)
     const LightProbe probe = unwrapMirrorBall(picture, ball, camera, {});
     EXPECT_TRUE(hasFinding(probe.findings, "probe-blind-spot"));
     for (const Rgb& texel : probe.environment.pixels.pixels())
-        ASSERT_NEAR(texel.r, 1.0f, 0.03f);
+        ASSERT_NEAR(texel.r, 1.0f, 0.02f);
 }
 
 TEST(UnwrapMirrorBall, SaysWhenThePictureCutsTheBall)
