@@ -2,6 +2,7 @@
 
 #include "core/check.h"
 #include "core/io/gltf_library.h"
+#include "core/io/model_resources.h"
 
 #include <cstring>
 #include <span>
@@ -22,8 +23,9 @@ const tinygltf::Accessor& accessorAt(const tinygltf::Model& gltf,
     if (index < 0 || static_cast<std::size_t>(index) >= gltf.accessors.size())
         fail(path, index, "does not exist");
     const tinygltf::Accessor& accessor = gltf.accessors[static_cast<std::size_t>(index)];
-    if (accessor.count > kMaxElements)
-        fail(path, index, fmt::format("{} elements; at most {}", accessor.count, kMaxElements));
+    if (accessor.count > kMaxModelElements)
+        fail(
+            path, index, fmt::format("{} elements; at most {}", accessor.count, kMaxModelElements));
     return accessor;
 }
 

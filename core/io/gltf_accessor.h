@@ -16,10 +16,7 @@ namespace insitu {
 /// sparse substitution (glTF 2.0, section 3.6.2). All throw InputError naming `path` and the
 /// accessor when it does not exist, has another type, or reaches outside its buffer.
 
-/// No model may have more vertices or indices than this (0.6 GB of vertices).
-inline constexpr std::size_t kMaxElements = 20'000'000;
-
-/// Number of elements, checked against kMaxElements; nothing is read.
+/// Number of elements, checked against kMaxModelElements; nothing is read.
 [[nodiscard]] std::size_t accessorCount(const tinygltf::Model& gltf,
                                         int accessor,
                                         const std::string& path);

@@ -3,6 +3,7 @@
 #include "core/check.h"
 #include "core/io/gltf_accessor.h"
 #include "core/io/gltf_library.h"
+#include "core/io/model_resources.h"
 
 #include <algorithm>
 #include <array>
@@ -195,10 +196,9 @@ private:
             return;
         }
         const int corners = primitive.indices >= 0 ? primitive.indices : positions->second;
-        elements_ += accessorCount(gltf_, positions->second, path_) +
-                     3 * accessorCount(gltf_, corners, path_);
-        if (elements_ > 4 * kMaxElements)
-            throw InputError(path_, fmt::format("more than {} vertices", kMaxElements));
+        vertices_ += accessorCount(gltf_, positions->second, path_);
+        corners_ += accessorCount(gltf_, corners, path_);
+        checkElementCount(std::max(vertices_, corners_), path_);
         has_colors_ |= primitive.attributes.contains("COLOR_0");
         instances_.emplace_back(&primitive, model_from_node);
     }
@@ -299,7 +299,8 @@ private:
     GltfMaterials& materials_;
     Model& model_;
     std::vector<std::pair<const tinygltf::Primitive*, glm::dmat4>> instances_;
-    std::size_t elements_ = 0;
+    std::size_t vertices_ = 0;
+    std::size_t corners_ = 0;
     std::size_t skipped_primitives_ = 0;
     bool any_normals_ = false;
     bool any_texcoords_ = false;

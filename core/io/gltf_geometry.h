@@ -17,7 +17,7 @@ namespace insitu {
 /// Triangles, strips and fans; points and lines are skipped (finding model-primitives-skipped), as
 /// are vertex colours (model-vertex-colors-ignored) and skins (model-skin-ignored). A primitive
 /// without normals is flat. InputError: a node that is reached twice (a cycle or two parents), an
-/// index out of range, more than kMaxElements vertices.
+/// index out of range, more than kMaxModelElements vertices.
 void gatherGltfTriangles(const tinygltf::Model& gltf,
                          const std::string& path,
                          GltfMaterials& materials,

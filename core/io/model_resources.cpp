@@ -50,6 +50,13 @@ cv::Mat decodeToRgba8(std::span<const std::uint8_t> bytes, const std::string& na
 
 }  // namespace
 
+void checkElementCount(std::uint64_t count, const std::string& path)
+{
+    if (count > kMaxModelElements)
+        throw InputError(
+            path, fmt::format("more than {} vertices; reduce the model first", kMaxModelElements));
+}
+
 fs::path resourceBeside(const fs::path& model, std::string_view name)
 {
     std::string cleaned(name);

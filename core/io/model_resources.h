@@ -14,8 +14,13 @@ namespace insitu {
 
 /// A model file, and each file that it names, is read only up to this size.
 inline constexpr std::int64_t kMaxModelBytes = 1LL << 30;
+/// A model may have at most this many vertices or corners of faces (some 3 GB while it is read).
+inline constexpr std::size_t kMaxModelElements = 20'000'000;
 /// 16384 x 8192: a texture larger than this is refused before it is decoded.
 inline constexpr std::int64_t kMaxTexturePixels = 1LL << 27;
+
+/// InputError naming `path` when `count` exceeds kMaxModelElements.
+void checkElementCount(std::uint64_t count, const std::string& path);
 
 /// The file that a model names, which must lie in the model's own folder or below it.
 ///

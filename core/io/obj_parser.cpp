@@ -1,6 +1,7 @@
 #include "core/io/obj_parser.h"
 
 #include "core/check.h"
+#include "core/io/model_resources.h"
 
 #include <algorithm>
 #include <array>
@@ -39,8 +40,14 @@ public:
 
     ObjFile parse()
     {
-        while (lines_.next())
+        while (lines_.next()) {
             parseLine();
+            checkElementCount(std::max({file_.positions.size(),
+                                        file_.texcoords.size(),
+                                        file_.normals.size(),
+                                        file_.corners.size()}),
+                              path_);
+        }
         checkRanges();
         return std::move(file_);
     }

@@ -52,6 +52,8 @@ public:
             if (element.properties.empty())
                 throw InputError(path_,
                                  fmt::format("element '{}' has no properties", element.name));
+            if (element.name == "vertex" || element.name == "face")
+                checkElementCount(element.count, path_);
             if (element.name == "vertex")
                 readVertices(element);
             else if (element.name == "face")
@@ -76,6 +78,7 @@ private:
             if (!(stated >= 0.0) || stated != std::floor(stated) || stated > 4294967295.0)
                 throw InputError(path_, "a list whose length is no whole number");
             count = static_cast<std::size_t>(stated);
+            checkElementCount(count, path_);
         }
         list_.clear();
         for (std::size_t i = 0; i < count; ++i)
@@ -117,6 +120,7 @@ private:
                     continue;
                 }
                 face_begin_.push_back(corners_.size());
+                checkElementCount(corners_.size() + list_.size(), path_);
                 corners_.insert(corners_.end(), list_.begin(), list_.end());
             }
     }

@@ -21,6 +21,7 @@ constexpr std::size_t kTriangleBytes = 50;
 void readBinary(const ByteView& view, std::vector<glm::vec3>& corners)
 {
     const std::size_t triangles = view.u32(80);
+    checkElementCount(3 * triangles, view.path());
     for (std::size_t t = 0; t < triangles; ++t) {
         std::size_t at = kHeaderBytes + t * kTriangleBytes + 12;
         for (int corner = 0; corner < 3; ++corner) {
@@ -48,6 +49,7 @@ void readText(std::string_view text, const std::string& path, std::vector<glm::v
                 position[c] =
                     objNumber(words[static_cast<std::size_t>(c) + 1], path, lines.number());
             corners.push_back(position);
+            checkElementCount(corners.size(), path);
         } else if (words[0] == "endfacet") {
             if (corners.size() - begin != 3) fail("the facet has not three vertices");
             begin = corners.size();

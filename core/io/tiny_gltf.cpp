@@ -6,6 +6,6 @@
 #pragma GCC diagnostic ignored "-Wunused-function"
 #pragma GCC diagnostic ignored "-Wtype-limits"
 #define TINYGLTF_IMPLEMENTATION
-#include <fstream>  // tinygltf forgets it with TINYGLTF_NO_FS
-
 #include "core/io/gltf_library.h"
+
+#include <fstream>  // tinygltf forgets it with TINYGLTF_NO_FS

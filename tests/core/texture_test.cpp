@@ -69,6 +69,20 @@ TEST(Texture, WrapsOrClamps)
     EXPECT_NEAR(texture.sample({42.0, 0.5}).r, 1.0, tolerance::kFloat);
 }
 
+TEST(Texture, RepeatsWithPeriodOne)
+{
+    Texture texture;
+    texture.texels = Image<glm::u8vec4>(4, 3);
+    for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 4; ++x)
+            texture.texels(x, y) = glm::u8vec4(60 * x, 80 * y, 20 * x * y, 255);
+    for (const float u : {0.0f, 0.125f, 0.4375f, 0.96875f})
+        for (int shift = -9; shift <= 9; ++shift)
+            expectNear(
+                texture.sample({u + static_cast<float>(shift), u - static_cast<float>(shift)}),
+                texture.sample({u, u}));
+}
+
 TEST(Texture, ClampsVerticallyOnItsOwn)
 {
     Texture texture;
