@@ -8,6 +8,11 @@
 #define TINYGLTF_NO_STB_IMAGE_WRITE
 #define TINYGLTF_NO_EXTERNAL_IMAGE
 
+// With TINYGLTF_NO_FS its implementation forgets to include what its writers use.
+#ifdef TINYGLTF_IMPLEMENTATION
+#include <fstream>
+#endif
+
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
 #pragma GCC diagnostic ignored "-Wshadow"

@@ -7,5 +7,3 @@
 #pragma GCC diagnostic ignored "-Wtype-limits"
 #define TINYGLTF_IMPLEMENTATION
 #include "core/io/gltf_library.h"
-
-#include <fstream>  // tinygltf forgets it with TINYGLTF_NO_FS
