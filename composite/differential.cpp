@@ -60,6 +60,40 @@ Image<Rgb> reflectanceOverPi(const Image<Rgb>& photo,
                                                      : result;
 }
 
+/// Raises clipped channels to what the light probe knows of them; returns how many pixels had any.
+///
+/// Where another channel of the pixel is not clipped it gives the level and the probe only the
+/// colour, since the probe sees the surface less sharply than the photograph does.
+std::size_t restoreClipped(const EncodedImage& photo,
+                           const Image<Rgb>& probe,
+                           double clip_code,
+                           Image<Rgb>& radiance)
+{
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
+        const glm::u16vec3 code = photo.codes.pixels()[i];
+        const Rgb seen = probe.pixels()[i];
+        Rgb& value = radiance.pixels()[i];
+        float known = 0.0f;
+        float known_probe = 0.0f;
+        bool any = false;
+        for (int c = 0; c < 3; ++c) {
+            if (code[c] >= clip_code) {
+                any = true;
+                continue;
+            }
+            known += value[c];
+            known_probe += seen[c];
+        }
+        if (!any) continue;
+        ++count;
+        const float level = known_probe > 0.0f ? known / known_probe : 1.0f;
+        for (int c = 0; c < 3; ++c)
+            if (code[c] >= clip_code) value[c] = std::max(value[c], level * seen[c]);
+    }
+    return count;
+}
+
 }  // namespace
 
 Findings CompositeOptions::validate() const
@@ -114,19 +148,8 @@ Composite compositeDifferential(const EncodedImage& photo,
     const int height = photo.codes.height();
     const double clip_code = options.clip_fraction * photo.max_code;
 
-    // The photograph's radiance, with the probe's where the photograph only gives a bound.
     Image<Rgb> radiance = photographedRadiance(photo, response, relative_exposure);
-    std::size_t clipped = 0;
-    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
-        bool any = false;
-        for (int c = 0; c < 3; ++c) {
-            if (photo.codes.pixels()[i][c] < clip_code) continue;
-            any = true;
-            float& value = radiance.pixels()[i][c];
-            value = std::max(value, layers.probe_radiance.pixels()[i][c]);
-        }
-        clipped += any;
-    }
+    const std::size_t clipped = restoreClipped(photo, layers.probe_radiance, clip_code, radiance);
     const Image<Rgb> reflectance = reflectanceOverPi(radiance, layers, options);
 
     Composite composite;

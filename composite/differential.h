@@ -50,8 +50,9 @@ struct Composite {
 ///   L = object + (1 − alpha)·(L_photo + ρ/π·(E_with − E_without)),
 /// and back through the photograph's own response and exposure. A clipped channel of the photograph
 /// is a lower bound: there L_photo is the larger of the bound and what the light probe saw of the
-/// same surface (layers.probe_radiance), and the channel stays clipped unless the result falls
-/// below the clipping level. Pixels outside the influence mask are the photograph's own codes.
+/// same surface (layers.probe_radiance, scaled to the pixel's unclipped channels), and the channel
+/// stays clipped unless the result falls below the clipping level. Pixels outside the influence
+/// mask are the photograph's own codes.
 [[nodiscard]] Composite compositeDifferential(const EncodedImage& photo,
                                               const ResponseCurve& response,
                                               double relative_exposure,

@@ -1,28 +1,17 @@
 #include "lighting/room_light.h"
 
 #include "core/color.h"
-#include "core/parallel.h"
-#include "core/random.h"
 #include "lighting/sampling.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace insitu {
-
-using std::numbers::pi;
 
 namespace {
 
 /// Rooms larger than this many texels get larger texels.
 constexpr double kMaxTexels = 1.5e6;
-/// Points per texel side at which the probe is looked up.
-constexpr int kBakeGrid = 2;
-/// No Lambert surface reflects more; what is brighter shines by itself.
-constexpr float kMaxReflectance = 0.95f;
-/// [GibCha03] section 4.2: for surfaces that no picture saw.
-constexpr float kUnseenReflectance = 0.5f;
 
 double totalArea(const SceneProxy& proxy)
 {
@@ -44,10 +33,12 @@ RoomLight::RoomLight(const SceneProxy& proxy,
       radiance_(proxy, std::max(options.texel_m, std::sqrt(totalArea(proxy) / kMaxTexels))),
       probe_saw_(radiance_.size(), 0),
       photo_saw_(radiance_.size(), 0),
+      gap_(radiance_.size(), 0),
       cell_irradiance_(proxy,
                        std::max(options.cell_m, std::sqrt(totalArea(proxy) / (kMaxTexels / 64.0)))),
       cell_reflectance_(cell_irradiance_)
 {
+    findGaps(probe, probe_center_m);
     bakeProbe(probe, probe_center_m, progress);
     if (photograph) fillFromPhotograph(*photograph);
     extendBeyondOpenings(probe, probe_center_m);
@@ -55,6 +46,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
 
     // Surfaces that nobody saw need the light that falls on them, which needs all surfaces: twice.
     gatherCells(options, progress);
+    fitUnseenOutside(options, progress);
     reportCoverage();
     if (hasFinding(findings_, "light-unseen-surfaces")) {
         fillUnseen();
@@ -63,138 +55,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
         fillUnseen();
         buildTables(options.reference_point_m);
     }
-}
-
-void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progress& progress)
-{
-    // Average the probe over the points of each texel that it saw and that are no opening.
-    for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
-        progress.checkpoint();
-        const int columns = radiance_.columns(face);
-        parallelFor(0, radiance_.rows(face), [&](std::int64_t row) {
-            for (int column = 0; column < columns; ++column) {
-                const typename FaceGrid<Rgb>::Texel texel{face, column, static_cast<int>(row)};
-                const std::size_t index =
-                    radiance_.firstOf(face) + static_cast<std::size_t>(row * columns + column);
-                Rgb sum(0.0f);
-                int seen = 0;
-                int solid = 0;
-                for (int k = 0; k < kBakeGrid * kBakeGrid; ++k) {
-                    const glm::dvec2 inside((k % kBakeGrid + 0.5) / kBakeGrid,
-                                            (k / kBakeGrid + 0.5) / kBakeGrid);
-                    const glm::dvec2 uv = radiance_.uv(texel, inside);
-                    if (proxy_.faces()[face].triangle && uv.x + uv.y > 1.0) continue;
-                    const glm::dvec3 point = proxy_.pointOn(face, uv);
-                    if (proxy_.insideOpening(face, point)) continue;
-                    ++solid;
-                    const glm::dvec3 way = point - center;
-                    const bool facing = proxy_.faces()[face].two_sided ||
-                                        glm::dot(way, proxy_.faces()[face].normal) < 0.0;
-                    if (!facing || !proxy_.mutuallyVisible(center, point)) continue;
-                    sum += lookUp(probe, glm::normalize(way));
-                    ++seen;
-                }
-                radiance_.setValid(index, solid > 0);
-                if (seen == 0) continue;
-                radiance_[index] = sum / static_cast<float>(seen);
-                probe_saw_[index] = 1;
-            }
-        });
-    }
-}
-
-void RoomLight::fillFromPhotograph(const PhotographedRadiance& photograph)
-{
-    const Camera& camera = photograph.camera;
-    parallelFor(0, static_cast<std::int64_t>(radiance_.faceCount()), [&](std::int64_t f) {
-        const std::size_t face = static_cast<std::size_t>(f);
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
-            if (probe_saw_[i] || !radiance_.valid(i)) continue;
-            const glm::dvec3 point =
-                proxy_.pointOn(face, radiance_.uv(radiance_.texel(i), glm::dvec2(0.5)));
-            const auto pixel = camera.project(point);
-            if (!pixel || pixel->x < 0 || pixel->y < 0 || pixel->x >= camera.width ||
-                pixel->y >= camera.height || !proxy_.mutuallyVisible(camera.position_m, point))
-                continue;
-            radiance_[i] = sampleBilinear(photograph.radiance, pixel->x, pixel->y);
-            photo_saw_[i] = 1;
-        }
-    });
-}
-
-void RoomLight::extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 center)
-{
-    const int width = probe.pixels.width();
-    const int height = probe.pixels.height();
-    outside_ = probe;
-    outside_seen_.assign(probe.pixels.pixelCount(), 0);
-
-    // A texel is seen when the ways through its centre and corners all leave the room.
-    const auto leaves = [&](double x, double y) {
-        const auto hit =
-            proxy_.intersect(center, environmentDirectionFromUv({x / width, y / height}));
-        return !hit || hit->opening;
-    };
-    parallelFor(0, height, [&](std::int64_t y) {
-        for (int x = 0; x < width; ++x) {
-            const double row = static_cast<double>(y);
-            const bool seen = leaves(x + 0.5, row + 0.5) && leaves(x, row) && leaves(x + 1, row) &&
-                              leaves(x, row + 1) && leaves(x + 1, row + 1);
-            outside_seen_[static_cast<std::size_t>(y * width + x)] = seen;
-        }
-    });
-
-    // Texels on the rim of what is seen are the nearest ones to all that is not.
-    struct RimTexel {
-        glm::vec3 direction;
-        Rgb radiance;
-    };
-    std::vector<RimTexel> rim;
-    const auto seenAt = [&](int x, int y) {
-        return outside_seen_[static_cast<std::size_t>(y * width + (x + width) % width)] != 0;
-    };
-    const auto directionOf = [&](int x, int y) {
-        return environmentDirectionFromUv({(x + 0.5) / width, (y + 0.5) / height});
-    };
-    bool all_seen = true;
-    for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-            all_seen = all_seen && seenAt(x, y);
-            if (!seenAt(x, y)) continue;
-            const bool inner = y > 0 && y + 1 < height && seenAt(x - 1, y) && seenAt(x + 1, y) &&
-                               seenAt(x, y - 1) && seenAt(x, y + 1);
-            if (!inner) rim.push_back({glm::vec3(directionOf(x, y)), probe.pixels(x, y)});
-        }
-    }
-    if (all_seen) return;
-    if (rim.empty()) {
-        if (!proxy_.openings().empty())
-            findings_.push_back({Severity::Warning,
-                                 "light-opening-unseen",
-                                 "the probe sees nothing through the openings; what lies beyond "
-                                 "them is taken from the probe's own directions"});
-        return;
-    }
-    parallelFor(0, height, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
-        for (int x = 0; x < width; ++x) {
-            if (seenAt(x, y)) continue;
-            const glm::vec3 direction(directionOf(x, y));
-            const RimTexel* nearest = &rim.front();
-            float best = -2.0f;
-            for (const RimTexel& texel : rim) {
-                const float closeness = glm::dot(direction, texel.direction);
-                if (closeness > best) {
-                    best = closeness;
-                    nearest = &texel;
-                }
-            }
-            outside_.pixels(x, y) = nearest->radiance;
-        }
-    });
+    scaleDoubtfulIrradiance();
 }
 
 double RoomLight::texelArea(std::size_t face) const
@@ -281,6 +142,15 @@ double RoomLight::texelPdf(std::size_t face, glm::dvec2 uv) const
                : 0.0;
 }
 
+std::uint8_t RoomLight::outsideBand(glm::dvec3 direction) const
+{
+    const Image<Rgb>& far = outside_.pixels;
+    const glm::dvec2 uv = environmentUvFromDirection(direction);
+    const int x = std::clamp(static_cast<int>(uv.x * far.width()), 0, far.width() - 1);
+    const int y = std::clamp(static_cast<int>(uv.y * far.height()), 0, far.height() - 1);
+    return outside_band_[static_cast<std::size_t>(y * far.width() + x)];
+}
+
 double RoomLight::outsidePdf(glm::dvec3 direction) const
 {
     if (!(outside_share_ > 0.0)) return 0.0;
@@ -293,10 +163,21 @@ double RoomLight::outsidePdf(glm::dvec3 direction) const
            environmentTexelSolidAngle(far.width(), far.height(), y);
 }
 
+std::optional<ProxyHit> RoomLight::intersect(glm::dvec3 x, glm::dvec3 direction) const
+{
+    auto hit = proxy_.intersect(x, direction);
+    while (hit && gap_[radiance_.texelAt(hit->face, hit->uv)]) {
+        const double passed = hit->distance_m;
+        hit = proxy_.intersect(hit->point, direction);
+        if (hit) hit->distance_m += passed;
+    }
+    return hit;
+}
+
 RoomLight::Arrival RoomLight::arrive(glm::dvec3 x, glm::dvec3 direction) const
 {
     Arrival arrival;
-    arrival.hit = proxy_.intersect(x, direction);
+    arrival.hit = intersect(x, direction);
     const auto& hit = arrival.hit;
     if (hit && !hit->opening) {
         const double cosine = std::abs(glm::dot(hit->normal, direction));
@@ -373,144 +254,6 @@ std::optional<RoomLight::DrawnArrival> RoomLight::draw(glm::dvec3 x,
         return std::nullopt;
     if (!(arrival.light.pdf > 0.0)) return std::nullopt;
     return DrawnArrival{way / length, arrival};
-}
-
-glm::dvec3 RoomLight::cellIrradianceAt(glm::dvec3 x,
-                                       glm::dvec3 normal,
-                                       std::uint64_t cell,
-                                       const RoomLightOptions& options) const
-{
-    // Cosine and light sampling joined by the balance heuristic [Veach97, 9.2].
-    glm::dvec3 sum(0.0);
-    const glm::dmat3 frame = frameFromNormal(normal);
-    for (int s = 0; s < options.rays_per_cell; ++s) {
-        RandomStream random(options.seed, cell, static_cast<std::uint64_t>(s));
-        const glm::dvec3 direction = frame * cosineHemisphere(random.uniform2());
-        const double cosine = glm::dot(direction, normal);
-        const IncidentLight seen = incident(x, direction);
-        if (cosine > 0.0) sum += glm::dvec3(seen.radiance) * (cosine / (cosine / pi + seen.pdf));
-        const double selector = random.uniformDouble();
-        const auto drawn = sample(x, selector, random.uniform2());
-        if (!drawn) continue;
-        const double drawn_cosine = glm::dot(drawn->direction, normal);
-        if (drawn_cosine > 0.0)
-            sum += glm::dvec3(drawn->radiance) * (drawn_cosine / (drawn_cosine / pi + drawn->pdf));
-    }
-    return sum / static_cast<double>(options.rays_per_cell);
-}
-
-void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
-{
-    constexpr int kGrid = 4;
-    parallelFor(0, static_cast<std::int64_t>(cell_irradiance_.size()), [&](std::int64_t number) {
-        const std::size_t cell = static_cast<std::size_t>(number);
-        const auto texel = cell_irradiance_.texel(cell);
-        const ProxyFace& face = proxy_.faces()[texel.face];
-        const glm::dvec2 center = cell_irradiance_.uv(texel, glm::dvec2(0.5));
-        const glm::dvec3 x = proxy_.pointOn(texel.face, center);
-
-        Rgb radiance(0.0f);
-        int count = 0;
-        for (int k = 0; k < kGrid * kGrid; ++k) {
-            const glm::dvec2 uv =
-                cell_irradiance_.uv(texel, {(k % kGrid + 0.5) / kGrid, (k / kGrid + 0.5) / kGrid});
-            if (!radiance_.valid(radiance_.texelAt(texel.face, uv))) continue;
-            radiance += faceRadiance(texel.face, uv);
-            ++count;
-        }
-        cell_irradiance_.setValid(cell, count > 0);
-        cell_reflectance_.setValid(cell, count > 0);
-        if (count == 0) return;
-        const Rgb irradiance(cellIrradianceAt(x, face.normal, cell, options));
-        cell_irradiance_[cell] = irradiance;
-        for (int c = 0; c < 3; ++c)
-            cell_reflectance_[cell][c] =
-                irradiance[c] > 0.0f ? std::min(static_cast<float>(pi) * radiance[c] /
-                                                    (static_cast<float>(count) * irradiance[c]),
-                                                kMaxReflectance)
-                                     : kUnseenReflectance;
-    });
-    progress.checkpoint();
-}
-
-void RoomLight::fillUnseen()
-{
-    for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
-        // Mean reflectance of what was seen of this face.
-        glm::dvec3 reflectance(0.0);
-        double seen_count = 0.0;
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        const auto seen = [&](std::size_t i) { return probe_saw_[i] || photo_saw_[i]; };
-        const auto uvOf = [&](std::size_t i) {
-            return radiance_.uv(radiance_.texel(i), glm::dvec2(0.5));
-        };
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
-            if (!radiance_.valid(i) || !seen(i)) continue;
-            reflectance +=
-                glm::dvec3(cell_reflectance_.lookUp(face, uvOf(i), Rgb(kUnseenReflectance)));
-            seen_count += 1.0;
-        }
-        const Rgb mean = seen_count > 0.0 ? Rgb(reflectance / seen_count) : Rgb(kUnseenReflectance);
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i)
-            if (radiance_.valid(i) && !seen(i))
-                radiance_[i] = mean * cell_irradiance_.lookUp(face, uvOf(i), Rgb(0.0f)) /
-                               static_cast<float>(pi);
-    }
-}
-
-void RoomLight::reportCoverage()
-{
-    double unseen = 0.0;
-    double total = 0.0;
-    for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
-            if (!radiance_.valid(i)) continue;
-            total += texelArea(face);
-            if (!probe_saw_[i] && !photo_saw_[i]) unseen += texelArea(face);
-        }
-    }
-    if (unseen > 0.0)
-        findings_.push_back(
-            {Severity::Info,
-             "light-unseen-surfaces",
-             fmt::format(
-                 "{:.1f} % of the room's surfaces were seen neither by the probe nor by the "
-                 "photograph; their radiance is gathered light times the mean reflectance",
-                 100.0 * unseen / total)});
-
-    // The share of the light through openings, at the middle of the room, that nobody saw.
-    if (portal_triangles_.empty() || !outside_table_) return;
-    double extended = 0.0;
-    double through = 0.0;
-    const Image<Rgb>& far = outside_.pixels;
-    glm::dvec3 middle(0.0);
-    for (const ProxyFace& face : proxy_.faces())
-        middle += (face.corner + 0.5 * (face.edge_u + face.edge_v)) / double(proxy_.faces().size());
-    for (int y = 0; y < far.height(); ++y) {
-        const double solid_angle = environmentTexelSolidAngle(far.width(), far.height(), y);
-        for (int x = 0; x < far.width(); ++x) {
-            const auto hit = proxy_.intersect(
-                middle,
-                environmentDirectionFromUv({(x + 0.5) / far.width(), (y + 0.5) / far.height()}));
-            if (!hit || !hit->opening) continue;
-            const double power = luminance(far(x, y)) * solid_angle;
-            through += power;
-            if (!outside_seen_[static_cast<std::size_t>(y * far.width() + x)]) extended += power;
-        }
-    }
-    if (through > 0.0 && extended > 0.0)
-        findings_.push_back(
-            {Severity::Info,
-             "light-opening-extended",
-             fmt::format(
-                 "{:.1f} % of the light through the openings (at the middle of the room) is "
-                 "taken from the nearest direction that the probe saw through them",
-                 100.0 * extended / through)});
 }
 
 }  // namespace insitu

@@ -7,8 +7,10 @@
 #include "lighting/alias_table.h"
 #include "lighting/face_grid.h"
 #include "lighting/light_source.h"
+#include "lighting/opening_fit.h"
 #include "reconstruct/scene_proxy.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -21,6 +23,9 @@ struct RoomLightOptions {
     double cell_m = 0.15;
     /// Rays per cell for its irradiance. Unitless, > 0.
     int rays_per_cell = 256;
+    /// Scale the light from directions through openings that the probe did not see so that it
+    /// explains how bright the surfaces are (opening_fit.h).
+    bool fit_unseen_outside = true;
     /// Where the objects stand: light is drawn by what it does there.
     glm::dvec3 reference_point_m{0.0};
     std::uint64_t seed = 1;
@@ -38,11 +43,17 @@ struct PhotographedRadiance {
 /// Each surface texel that the probe saw has the radiance the probe measured in its direction. One
 /// it did not see takes the photograph's, or, unseen by both, gathers light with its face's mean
 /// reflectance ([GibCha03] 4.2; 0.5 where nothing of the face was seen). A direction through an
-/// opening that the probe did not see through takes the nearest one that it did. Rays that miss the
-/// proxy see the probe's environment at infinity.
+/// opening that the probe did not see through takes the nearest one that it did, scaled so that the
+/// light on each surface explains its measured radiance (opening_fit.h). Rays that miss the proxy
+/// see the probe's environment at infinity.
+///
+/// A solid box stands for furniture that may have gaps: where the probe, looking at its face
+/// towards an opening, saw more light than any surface there could reflect, it saw the opening
+/// through a gap, and light passes.
 ///
 /// Findings: "light-unseen-surfaces" (share of the area), "light-opening-extended" (share of the
-/// light through openings that is taken from the nearest seen direction), "light-opening-unseen".
+/// light through openings that is taken from the nearest seen direction), "light-opening-unseen",
+/// "light-opening-fitted" (the scale), "light-through-gaps".
 class RoomLight : public LightSource {
 public:
     RoomLight(const SceneProxy& proxy,
@@ -72,40 +83,68 @@ public:
                                                    double selector,
                                                    glm::vec2 u) const;
 
+    /// What a ray meets: as SceneProxy::intersect, but gaps in solid boxes are passed.
+    [[nodiscard]] std::optional<ProxyHit> intersect(glm::dvec3 x, glm::dvec3 direction) const;
+
     [[nodiscard]] const SceneProxy& proxy() const { return proxy_; }
     /// Radiance of a surface as the probe saw it; 0 where it did not.
     [[nodiscard]] Rgb probeRadiance(std::size_t face, glm::dvec2 uv) const;
+    /// What a surface's irradiance, as computed, is to be multiplied by. Solid boxes are coarser
+    /// than the furniture they stand for and hide too much or too little; where they are in the way
+    /// the irradiance may be anything between the box as given and no box at all, and the value is
+    /// chosen that leaves the surface the reflectance of the rest of its face. 1 elsewhere.
+    [[nodiscard]] Rgb irradianceScale(std::size_t face, glm::dvec2 uv) const;
     /// Irradiance and Lambert reflectance of the surfaces, on the cell grid.
     [[nodiscard]] const FaceGrid<Rgb>& cellIrradiance() const { return cell_irradiance_; }
     [[nodiscard]] const FaceGrid<Rgb>& cellReflectance() const { return cell_reflectance_; }
     [[nodiscard]] const Findings& findings() const { return findings_; }
 
 private:
+    void findGaps(const EnvironmentMap& probe, glm::dvec3 center);
     void bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progress& progress);
     void fillFromPhotograph(const PhotographedRadiance& photograph);
     void extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 center);
     void buildTables(glm::dvec3 reference);
     void gatherCells(const RoomLightOptions& options, Progress& progress);
+    void fitUnseenOutside(const RoomLightOptions& options, Progress& progress);
+    void scaleDoubtfulIrradiance();
     void fillUnseen();
     void reportCoverage();
     [[nodiscard]] Rgb faceRadiance(std::size_t face, glm::dvec2 uv) const;
+    [[nodiscard]] Rgb radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const;
     [[nodiscard]] double texelArea(std::size_t face) const;
     [[nodiscard]] double texelPdf(std::size_t face, glm::dvec2 uv) const;
     [[nodiscard]] double outsidePdf(glm::dvec3 direction) const;
+    [[nodiscard]] std::uint8_t outsideBand(glm::dvec3 direction) const;
+    /// By how much a cell's irradiance would fall or rise were solid boxes not there.
+    struct Doubt {
+        glm::dvec3 lower{0.0};
+        glm::dvec3 higher{0.0};
+    };
+    using BandIrradiance = std::array<glm::dvec3, kOpeningBands>;
     [[nodiscard]] glm::dvec3 cellIrradianceAt(glm::dvec3 x,
                                               glm::dvec3 normal,
                                               std::uint64_t cell,
-                                              const RoomLightOptions& options) const;
+                                              const RoomLightOptions& options,
+                                              BandIrradiance* bands,
+                                              Doubt* doubt) const;
 
     const SceneProxy& proxy_;
     FaceGrid<Rgb> radiance_;               ///< every texel outside openings is valid when built
     std::vector<std::uint8_t> probe_saw_;  ///< per texel of radiance_
     std::vector<std::uint8_t> photo_saw_;
+    std::vector<std::uint8_t> gap_;  ///< per texel of radiance_: light passes
     FaceGrid<Rgb> cell_irradiance_;
     FaceGrid<Rgb> cell_reflectance_;
     EnvironmentMap outside_;  ///< what lies beyond the openings, or everywhere
     std::vector<std::uint8_t> outside_seen_;
-    bool outside_is_everywhere_ = false;  ///< no openings: rays that miss see the probe itself
+    /// Of a direction the probe did not see through an opening: where it lies from those it saw.
+    static constexpr std::uint8_t kSeenBand = 255;
+    std::vector<std::uint8_t> outside_band_;
+    std::vector<BandIrradiance> cell_bands_;  ///< part of cell_irradiance_ from unseen directions
+    std::vector<Rgb> cell_radiance_;
+    std::vector<Doubt> cell_doubt_;
+    FaceGrid<Rgb> irradiance_scale_;
 
     /// The three ways to draw light: a texel by its power, a point in an opening, a far direction.
     std::optional<AliasTable> texel_table_;

@@ -1,5 +1,6 @@
 #include "pipeline/insert.h"
 
+#include "calib/photo_calibration.h"
 #include "core/color.h"
 #include "core/io/image_io.h"
 
@@ -200,8 +201,7 @@ CameraEstimate solveCamera(const Project& project, const Photo& photo, bool use_
     demandSize(lines.width, lines.height);
     CalibrationOptions options;
     options.use_exif = use_exif_focal;
-    options.exif_focal_px = photo.metadata.focal_px;
-    return calibrateCamera(lines, options, source.string());
+    return calibratePhoto(lines, photo, options, source.string());
 }
 
 InsertResult insertObjects(const Project& project, const InsertOptions& options, Progress& progress)

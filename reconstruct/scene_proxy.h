@@ -52,6 +52,7 @@ struct ProxyFace {
     glm::dvec3 corner{0.0}, edge_u{0.0}, edge_v{0.0}, normal{0.0};
     bool triangle = false;
     bool two_sided = false;
+    bool solid = false;  ///< of a solid box: a stand-in for furniture, which may have gaps
     std::string name;
     std::vector<std::size_t> openings;  ///< indices of openings that are cut into this face
 };

@@ -25,8 +25,10 @@ struct PixelSums {
     int receivers = 0;
     glm::dvec3 without{0.0};
     glm::dvec3 with{0.0};
-    double change = 0.0;  ///< luminance of with − without
+    double without_square = 0.0;  ///< of luminance
+    double change = 0.0;          ///< luminance of with − without
     double change_square = 0.0;
+    std::int32_t surface = -1;  ///< the face most recently seen; one a pixel but at edges
     glm::dvec3 probe{0.0};
     int probe_count = 0;
 
@@ -37,16 +39,25 @@ struct PixelSums {
         const double mean = static_cast<double>(luminance(Rgb(object))) / count;
         return std::max(0.0, object_square / count - mean * mean) / (count - 1);
     }
+    [[nodiscard]] double withoutVariance() const
+    {
+        if (receivers < 2) return 0.0;
+        const double mean = static_cast<double>(luminance(Rgb(without))) / receivers;
+        return std::max(0.0, without_square / receivers - mean * mean) / (receivers - 1);
+    }
+    [[nodiscard]] double changeVariance() const
+    {
+        if (receivers < 2) return 0.0;
+        const double mean = change / receivers;
+        return std::max(0.0, change_square / receivers - mean * mean) / (receivers - 1);
+    }
     /// Variance of the mean change over the mean irradiance.
     [[nodiscard]] double ratioVariance() const
     {
         const double base = luminance(Rgb(without));
         if (receivers < 2 || !(base > 0.0)) return 0.0;
-        const double mean = change / receivers;
-        const double variance =
-            std::max(0.0, change_square / receivers - mean * mean) / (receivers - 1);
         const double mean_base = base / receivers;
-        return variance / (mean_base * mean_base);
+        return changeVariance() / (mean_base * mean_base);
     }
     [[nodiscard]] bool quiet(double target) const
     {
@@ -88,10 +99,17 @@ public:
             return;
         }
         if (!surface || surface->opening) return;
-        const ReceiverSample drawn =
+        ReceiverSample drawn =
             scene_.sampleReceiver(surface->point, surface->normal, options_.path, random);
+        const glm::dvec3 scale(scene_.room().irradianceScale(surface->face, surface->uv));
+        const glm::dvec3 corrected = scale * drawn.without;
+        drawn.with += corrected - drawn.without;
+        drawn.without = corrected;
         const double change = luminance(Rgb(drawn.with - drawn.without));
+        const double base = luminance(Rgb(drawn.without));
+        sums.surface = static_cast<std::int32_t>(surface->face);
         sums.without += drawn.without;
+        sums.without_square += base * base;
         sums.with += drawn.with;
         sums.change += change;
         sums.change_square += change * change;
@@ -125,13 +143,43 @@ void store(const PixelSums& sums, int x, int y, RenderLayers& layers)
     layers.alpha(x, y) = static_cast<float>(sums.covered) / static_cast<float>(sums.count);
     layers.depth_m(x, y) = sums.covered > 0 ? static_cast<float>(sums.depth) : 0.0f;
     layers.object_variance(x, y) = static_cast<float>(sums.objectVariance());
-    layers.ratio_variance(x, y) = static_cast<float>(sums.ratioVariance());
-    if (sums.receivers > 0) {
-        layers.irradiance_without(x, y) = Rgb(sums.without / static_cast<double>(sums.receivers));
-        layers.irradiance_with(x, y) = Rgb(sums.with / static_cast<double>(sums.receivers));
-    }
     if (sums.probe_count > 0)
         layers.probe_radiance(x, y) = Rgb(sums.probe / static_cast<double>(sums.probe_count));
+}
+
+/// Irradiances of all receivers, smoothed as far as their noise allows; the change by itself, so
+/// that a shadow's edge is not taken for noise of the light around it.
+void storeIrradiance(const std::vector<PixelSums>& sums,
+                     const IrradianceFilterOptions& filter,
+                     RenderLayers& layers)
+{
+    const int width = layers.alpha.width();
+    const int height = layers.alpha.height();
+    Image<Rgb> without(width, height);
+    Image<Rgb> change(width, height);
+    Image<float> without_variance(width, height);
+    Image<float> change_variance(width, height);
+    Image<std::int32_t> surface(width, height, -1);
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const PixelSums& pixel = sums[i];
+        if (pixel.receivers == 0) continue;
+        const double n = pixel.receivers;
+        surface.pixels()[i] = pixel.surface;
+        without.pixels()[i] = Rgb(pixel.without / n);
+        change.pixels()[i] = Rgb((pixel.with - pixel.without) / n);
+        without_variance.pixels()[i] = static_cast<float>(pixel.withoutVariance());
+        change_variance.pixels()[i] = static_cast<float>(pixel.changeVariance());
+    }
+    filterIrradiance(without, without_variance, surface, filter);
+    filterIrradiance(change, change_variance, surface, filter);
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const Rgb base = without.pixels()[i];
+        const float level = luminance(base);
+        layers.irradiance_without.pixels()[i] = base;
+        layers.irradiance_with.pixels()[i] = glm::max(base + change.pixels()[i], Rgb(0.0f));
+        if (level > 0.0f)
+            layers.ratio_variance.pixels()[i] = change_variance.pixels()[i] / (level * level);
+    }
 }
 
 }  // namespace
@@ -199,17 +247,20 @@ InsertionResult renderInsertion(const Camera& camera,
 
     result.layers = emptyLayers(width, height);
     double samples = 0.0;
-    double variance = 0.0;
-    double receivers = 0.0;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const PixelSums& pixel = sums[static_cast<std::size_t>(y) * width + x];
             store(pixel, x, y, result.layers);
             samples += pixel.count;
-            if (pixel.receivers == 0) continue;
-            variance += pixel.ratioVariance();
-            receivers += 1.0;
         }
+    }
+    storeIrradiance(sums, options.filter, result.layers);
+    double variance = 0.0;
+    double receivers = 0.0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        if (sums[i].receivers == 0) continue;
+        variance += result.layers.ratio_variance.pixels()[i];
+        receivers += 1.0;
     }
     result.mean_samples = samples / (static_cast<double>(width) * height);
     result.ratio_error = receivers > 0.0 ? std::sqrt(variance / receivers) : 0.0;

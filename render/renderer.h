@@ -4,6 +4,7 @@
 #include "core/layers.h"
 #include "core/progress.h"
 #include "lighting/room_light.h"
+#include "render/irradiance_filter.h"
 #include "render/object_scene.h"
 #include "render/room_with_objects.h"
 
@@ -20,15 +21,16 @@ struct InsertionOptions {
     /// Most samples of one pixel, > 0.
     int max_samples = 256;
     /// Fewest, before a pixel may stop early, in [1, max_samples].
-    int min_samples = 32;
+    int min_samples = 16;
     /// A pixel stops when the standard error of its with/without ratio and of its object radiance
-    /// (relative) falls below this. Unitless, >= 0; 0 = always max_samples.
-    double target_error = 0.004;
+    /// (relative) falls below this, before neighbours are averaged. >= 0; 0 = always max_samples.
+    double target_error = 0.01;
     /// Stop after this many seconds; 0 = no limit. With a limit the result depends on the machine.
     double max_seconds = 0.0;
     std::uint64_t seed = 1;
     PathOptions path{.max_bounces = 6, .roulette_start = 3};
     InterreflectionOptions interreflection;
+    IrradianceFilterOptions filter;
 
     [[nodiscard]] Findings validate() const;
 };

@@ -1,0 +1,296 @@
+#include "core/color.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "lighting/opening_fit.h"
+#include "lighting/room_light.h"
+#include "lighting/sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace insitu {
+
+using std::numbers::pi;
+
+namespace {
+
+/// No Lambert surface reflects more; what is brighter shines by itself.
+constexpr float kMaxReflectance = 0.95f;
+/// [GibCha03] section 4.2: for surfaces that no picture saw.
+constexpr float kUnseenReflectance = 0.5f;
+/// Share of a cell's irradiance that may be in doubt before the cell says little of its face.
+constexpr double kLittleDoubt = 0.1;
+constexpr std::size_t kMinFaceCells = 20;
+
+}  // namespace
+
+glm::dvec3 RoomLight::cellIrradianceAt(glm::dvec3 x,
+                                       glm::dvec3 normal,
+                                       std::uint64_t cell,
+                                       const RoomLightOptions& options,
+                                       BandIrradiance* bands,
+                                       Doubt* doubt) const
+{
+    // Cosine and light sampling joined by the balance heuristic [Veach97, 9.2].
+    glm::dvec3 sum(0.0);
+    const glm::dmat3 frame = frameFromNormal(normal);
+    const auto add = [&](glm::dvec3 direction, const Arrival& arrival) {
+        const double cosine = glm::dot(direction, normal);
+        if (cosine <= 0.0) return;
+        const glm::dvec3 part =
+            glm::dvec3(arrival.light.radiance) * (cosine / (cosine / pi + arrival.light.pdf));
+        sum += part;
+        const double share = 1.0 / options.rays_per_cell;
+        if (!arrival.hit || arrival.hit->opening) {
+            const std::uint8_t band = outsideBand(direction);
+            if (band != kSeenBand) (*bands)[band] += part * share;
+        } else if (proxy_.faces()[arrival.hit->face].solid) {
+            const double weight = cosine / (cosine / pi + arrival.light.pdf) * share;
+            const glm::dvec3 change =
+                weight * (glm::dvec3(radianceBehind(*arrival.hit, direction)) -
+                          glm::dvec3(arrival.light.radiance));
+            doubt->lower += glm::min(change, glm::dvec3(0.0));
+            doubt->higher += glm::max(change, glm::dvec3(0.0));
+        }
+    };
+    const int strata = static_cast<int>(std::sqrt(options.rays_per_cell));
+    for (int s = 0; s < options.rays_per_cell; ++s) {
+        RandomStream random(options.seed, cell, static_cast<std::uint64_t>(s));
+        glm::vec2 u = random.uniform2();
+        if (s < strata * strata)
+            u = (u + glm::vec2(s % strata, s / strata)) / static_cast<float>(strata);
+        const glm::dvec3 direction = frame * cosineHemisphere(u);
+        add(direction, arrive(x, direction));
+        const double selector = random.uniformDouble();
+        if (const auto drawn = draw(x, selector, random.uniform2()))
+            add(drawn->direction, drawn->arrival);
+    }
+    return sum / static_cast<double>(options.rays_per_cell);
+}
+
+void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
+{
+    constexpr int kGrid = 4;
+    cell_bands_.resize(cell_irradiance_.size());
+    cell_doubt_.resize(cell_irradiance_.size());
+    cell_radiance_.resize(cell_irradiance_.size());
+    parallelFor(0, static_cast<std::int64_t>(cell_irradiance_.size()), [&](std::int64_t number) {
+        const std::size_t cell = static_cast<std::size_t>(number);
+        const auto texel = cell_irradiance_.texel(cell);
+        const ProxyFace& face = proxy_.faces()[texel.face];
+        const glm::dvec2 center = cell_irradiance_.uv(texel, glm::dvec2(0.5));
+        const glm::dvec3 x = proxy_.pointOn(texel.face, center);
+
+        Rgb radiance(0.0f);
+        int count = 0;
+        for (int k = 0; k < kGrid * kGrid; ++k) {
+            const glm::dvec2 uv =
+                cell_irradiance_.uv(texel, {(k % kGrid + 0.5) / kGrid, (k / kGrid + 0.5) / kGrid});
+            if (!radiance_.valid(radiance_.texelAt(texel.face, uv))) continue;
+            radiance += faceRadiance(texel.face, uv);
+            ++count;
+        }
+        cell_irradiance_.setValid(cell, count > 0);
+        cell_reflectance_.setValid(cell, count > 0);
+        cell_bands_[cell] = {};
+        cell_doubt_[cell] = {};
+        if (count == 0) return;
+        cell_radiance_[cell] = radiance / static_cast<float>(count);
+        const Rgb irradiance(cellIrradianceAt(
+            x, face.normal, cell, options, &cell_bands_[cell], &cell_doubt_[cell]));
+        cell_irradiance_[cell] = irradiance;
+        for (int c = 0; c < 3; ++c)
+            cell_reflectance_[cell][c] =
+                irradiance[c] > 0.0f ? std::min(static_cast<float>(pi) * radiance[c] /
+                                                    (static_cast<float>(count) * irradiance[c]),
+                                                kMaxReflectance)
+                                     : kUnseenReflectance;
+    });
+    progress.checkpoint();
+}
+
+void RoomLight::fitUnseenOutside(const RoomLightOptions& options, Progress& progress)
+{
+    if (portal_triangles_.empty() || !options.fit_unseen_outside) return;
+    std::vector<LitCell> cells;
+    double guessed = 0.0;
+    double total = 0.0;
+    for (std::size_t i = 0; i < cell_irradiance_.size(); ++i) {
+        if (!cell_irradiance_.valid(i)) continue;
+        const auto texel = cell_irradiance_.texel(i);
+        const std::size_t here =
+            radiance_.texelAt(texel.face, cell_irradiance_.uv(texel, glm::dvec2(0.5)));
+        if (!probe_saw_[here] && !photo_saw_[here]) continue;
+        LitCell cell;
+        cell.face = texel.face;
+        cell.area =
+            proxy_.area(texel.face) / (static_cast<double>(cell_irradiance_.columns(texel.face)) *
+                                       cell_irradiance_.rows(texel.face));
+        cell.radiance = glm::dvec3(cell_radiance_[i]);
+        cell.guessed = cell_bands_[i];
+        cell.known = glm::dvec3(cell_irradiance_[i]);
+        for (const glm::dvec3& band : cell.guessed) {
+            cell.known = glm::max(cell.known - band, glm::dvec3(0.0));
+            guessed += cell.area * luminance(Rgb(band));
+        }
+        total += cell.area * luminance(cell_irradiance_[i]);
+        cells.push_back(cell);
+    }
+    if (!(guessed > 0.01 * total)) return;
+    const auto factors = fitOpeningBands(cells);
+    for (std::size_t i = 0; i < outside_band_.size(); ++i)
+        if (outside_band_[i] != kSeenBand)
+            outside_.pixels.pixels()[i] *= Rgb(factors[outside_band_[i]]);
+    findings_.push_back(
+        {Severity::Info,
+         "light-opening-fitted",
+         fmt::format("the light through the openings from directions the probe did not see was "
+                     "scaled by {:.2f} above, {:.2f} below and {:.2f} beside what it saw "
+                     "(luminance), so that it explains how bright the surfaces are",
+                     luminance(Rgb(factors[0])),
+                     luminance(Rgb(factors[1])),
+                     luminance(Rgb(factors[2])))});
+    buildTables(options.reference_point_m);
+    gatherCells(options, progress);
+}
+
+Rgb RoomLight::radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const
+{
+    auto hit = proxy_.intersect(solid.point, direction);
+    while (hit && proxy_.faces()[hit->face].solid)
+        hit = proxy_.intersect(hit->point, direction);
+    return hit && !hit->opening ? faceRadiance(hit->face, hit->uv) : lookUp(outside_, direction);
+}
+
+Rgb RoomLight::irradianceScale(std::size_t face, glm::dvec2 uv) const
+{
+    return irradiance_scale_.lookUp(face, uv, Rgb(1.0f));
+}
+
+void RoomLight::scaleDoubtfulIrradiance()
+{
+    irradiance_scale_ = cell_irradiance_;
+    for (std::size_t i = 0; i < irradiance_scale_.size(); ++i)
+        irradiance_scale_[i] = Rgb(1.0f);
+    for (std::size_t face = 0; face < cell_irradiance_.faceCount(); ++face) {
+        const std::size_t begin = cell_irradiance_.firstOf(face);
+        const std::size_t count =
+            static_cast<std::size_t>(cell_irradiance_.columns(face) * cell_irradiance_.rows(face));
+        if (proxy_.faces()[face].solid || count < kMinFaceCells) continue;
+        for (int c = 0; c < 3; ++c) {
+            // The face's reflectance, from the cells that no box makes doubtful.
+            const auto usable = [&](std::size_t i) {
+                return cell_irradiance_.valid(i) && cell_irradiance_[i][c] > 0.0f &&
+                       cell_radiance_[i][c] > 0.0f;
+            };
+            double weights = 0.0;
+            double log_reflectance = 0.0;
+            for (std::size_t i = begin; i < begin + count; ++i) {
+                if (!usable(i)) continue;
+                const double doubt = (cell_doubt_[i].higher[c] - cell_doubt_[i].lower[c]) /
+                                     (kLittleDoubt * cell_irradiance_[i][c]);
+                const double weight = 1.0 / (1.0 + doubt * doubt);
+                weights += weight;
+                log_reflectance +=
+                    weight * std::log(pi * cell_radiance_[i][c] / cell_irradiance_[i][c]);
+            }
+            if (weights < 0.2 * static_cast<double>(count)) continue;
+            const double reflectance = std::exp(log_reflectance / weights);
+            for (std::size_t i = begin; i < begin + count; ++i) {
+                if (!usable(i)) continue;
+                const double irradiance = cell_irradiance_[i][c];
+                const double wanted = pi * cell_radiance_[i][c] / reflectance;
+                const double found = std::clamp(wanted,
+                                                std::max(0.0, irradiance + cell_doubt_[i].lower[c]),
+                                                irradiance + cell_doubt_[i].higher[c]);
+                irradiance_scale_[i][c] = static_cast<float>(found / irradiance);
+                cell_reflectance_[i][c] =
+                    std::min(static_cast<float>(pi * cell_radiance_[i][c] / std::max(found, 1e-30)),
+                             kMaxReflectance);
+            }
+        }
+    }
+}
+
+void RoomLight::fillUnseen()
+{
+    for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
+        // Mean reflectance of what was seen of this face.
+        glm::dvec3 reflectance(0.0);
+        double seen_count = 0.0;
+        const std::size_t end =
+            radiance_.firstOf(face) +
+            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
+        const auto seen = [&](std::size_t i) { return probe_saw_[i] || photo_saw_[i]; };
+        const auto uvOf = [&](std::size_t i) {
+            return radiance_.uv(radiance_.texel(i), glm::dvec2(0.5));
+        };
+        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
+            if (!radiance_.valid(i) || !seen(i)) continue;
+            reflectance +=
+                glm::dvec3(cell_reflectance_.lookUp(face, uvOf(i), Rgb(kUnseenReflectance)));
+            seen_count += 1.0;
+        }
+        const Rgb mean = seen_count > 0.0 ? Rgb(reflectance / seen_count) : Rgb(kUnseenReflectance);
+        for (std::size_t i = radiance_.firstOf(face); i < end; ++i)
+            if (radiance_.valid(i) && !seen(i))
+                radiance_[i] = mean * cell_irradiance_.lookUp(face, uvOf(i), Rgb(0.0f)) /
+                               static_cast<float>(pi);
+    }
+}
+
+void RoomLight::reportCoverage()
+{
+    double unseen = 0.0;
+    double total = 0.0;
+    for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
+        const std::size_t end =
+            radiance_.firstOf(face) +
+            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
+        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
+            if (!radiance_.valid(i)) continue;
+            total += texelArea(face);
+            if (!probe_saw_[i] && !photo_saw_[i]) unseen += texelArea(face);
+        }
+    }
+    if (unseen > 0.0)
+        findings_.push_back(
+            {Severity::Info,
+             "light-unseen-surfaces",
+             fmt::format(
+                 "{:.1f} % of the room's surfaces were seen neither by the probe nor by the "
+                 "photograph; their radiance is gathered light times the mean reflectance",
+                 100.0 * unseen / total)});
+
+    // The share of the light through openings, at the middle of the room, that nobody saw.
+    if (portal_triangles_.empty() || !outside_table_) return;
+    double extended = 0.0;
+    double through = 0.0;
+    const Image<Rgb>& far = outside_.pixels;
+    glm::dvec3 middle(0.0);
+    for (const ProxyFace& face : proxy_.faces())
+        middle += (face.corner + 0.5 * (face.edge_u + face.edge_v)) / double(proxy_.faces().size());
+    for (int y = 0; y < far.height(); ++y) {
+        const double solid_angle = environmentTexelSolidAngle(far.width(), far.height(), y);
+        for (int x = 0; x < far.width(); ++x) {
+            const auto hit = proxy_.intersect(
+                middle,
+                environmentDirectionFromUv({(x + 0.5) / far.width(), (y + 0.5) / far.height()}));
+            if (!hit || !hit->opening) continue;
+            const double power = luminance(far(x, y)) * solid_angle;
+            through += power;
+            if (!outside_seen_[static_cast<std::size_t>(y * far.width() + x)]) extended += power;
+        }
+    }
+    if (through > 0.0 && extended > 0.0)
+        findings_.push_back(
+            {Severity::Info,
+             "light-opening-extended",
+             fmt::format(
+                 "{:.1f} % of the light through the openings (at the middle of the room) is "
+                 "taken from the nearest direction that the probe saw through them",
+                 100.0 * extended / through)});
+}
+
+}  // namespace insitu

@@ -1,0 +1,211 @@
+#include "lighting/room_light.h"
+
+#include "core/random.h"
+#include "lighting/sampling.h"
+#include "tests/support/tolerance.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace insitu {
+namespace {
+
+using std::numbers::pi;
+
+EnvironmentMap environmentOf(int height, const std::function<Rgb(glm::dvec3)>& radiance)
+{
+    EnvironmentMap map{Image<Rgb>(2 * height, height)};
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < 2 * height; ++x)
+            map.pixels(x, y) = radiance(
+                environmentDirectionFromUv({(x + 0.5) / (2.0 * height), (y + 0.5) / height}));
+    return map;
+}
+
+RoomDescription closedRoom()
+{
+    RoomDescription room;
+    room.boxes.push_back({{-2, 0, -3}, {2, 2.5, 2}, false, ""});
+    return room;
+}
+
+RoomDescription roomWithWindow()
+{
+    RoomDescription room = closedRoom();
+    room.openings.push_back({{{2, 1, -1}, {2, 1, 1}, {2, 2, 1}, {2, 2, -1}}});
+    return room;
+}
+
+/// Large texels: the tests look at the light, not at its sharpness.
+RoomLightOptions coarse()
+{
+    RoomLightOptions options;
+    options.texel_m = 0.05;
+    options.cell_m = 0.5;
+    return options;
+}
+
+Progress g_silent;
+
+TEST(RoomLight, WhiteFurnaceHasIrradiancePi)
+{
+    const SceneProxy proxy(closedRoom());
+    const EnvironmentMap white = environmentOf(64, [](glm::dvec3) { return Rgb(1.0f); });
+    const RoomLight light(proxy, white, {0.3, 1.0, -0.4}, std::nullopt, coarse(), g_silent);
+    EXPECT_EQ(light.incident({1, 1, 1}, {0, 0, -1}).radiance, Rgb(1.0f));
+    double mean = 0.0;
+    const std::size_t count = light.cellIrradiance().size();
+    for (std::size_t i = 0; i < count; ++i) {
+        mean += light.cellIrradiance()[i].g / static_cast<double>(count);
+        // 256 samples joined with light sampling scatter by about 2 %.
+        EXPECT_NEAR(light.cellIrradiance()[i].g, pi, 0.3) << i;
+    }
+    EXPECT_NEAR(mean, pi, 0.01);
+}
+
+TEST(RoomLight, ALampOnTheWallIsNearAndNotAtInfinity)
+{
+    const SceneProxy proxy(closedRoom());
+    const glm::dvec3 center(0.0, 1.0, 0.0);
+    const glm::dvec3 lamp(-2.0, 1.5, 0.5);
+    const glm::dvec3 towards = glm::normalize(lamp - center);
+    const EnvironmentMap probe = environmentOf(256, [&](glm::dvec3 d) {
+        return glm::dot(d, towards) > std::cos(0.05) ? Rgb(100.0f) : Rgb(0.1f);
+    });
+    const RoomLight light(proxy, probe, center, std::nullopt, coarse(), g_silent);
+    const glm::dvec3 x(1.0, 0.2, -1.5);
+    EXPECT_NEAR(light.incident(x, glm::normalize(lamp - x)).radiance.r, 100.0f, 1.0f);
+    // In the probe's own direction there is only wall.
+    EXPECT_NEAR(light.incident(x, towards).radiance.r, 0.1f, 1e-4f);
+}
+
+TEST(RoomLight, WhatIsSeenThroughAnOpeningStaysAtInfinity)
+{
+    const SceneProxy proxy(roomWithWindow());
+    const glm::dvec3 center(0.0, 1.5, 0.0);
+    // The fit would try to explain walls that are darker than any such window makes them.
+    RoomLightOptions options = coarse();
+    options.fit_unseen_outside = false;
+    // Outside, radiance depends on the direction; walls are dark.
+    const EnvironmentMap probe = environmentOf(256, [&](glm::dvec3 d) {
+        const bool window = d.x > 0 && std::abs(d.z / d.x) < 0.49 && std::abs(d.y / d.x) < 0.245;
+        return window ? Rgb(static_cast<float>(10.0 + 5.0 * d.z)) : Rgb(0.2f);
+    });
+    const RoomLight light(proxy, probe, center, std::nullopt, options, g_silent);
+    const glm::dvec3 d = glm::normalize(glm::dvec3(1.0, 0.1, 0.3));
+    const float expected = static_cast<float>(10.0 + 5.0 * d.z);
+    for (const glm::dvec3& x : {glm::dvec3(0, 1.4, 0), glm::dvec3(1, 1.5, -0.5)}) {
+        const RoomLight::Arrival arrival = light.arrive(x, d);
+        ASSERT_TRUE(arrival.hit && arrival.hit->opening);
+        EXPECT_NEAR(arrival.light.radiance.r, expected, 0.05f);
+    }
+    // A direction the probe did not see through the window takes the nearest one that it did.
+    const glm::dvec3 steep = glm::normalize(glm::dvec3(0.5, 0.6, 0.0));
+    const RoomLight::Arrival extended = light.arrive({1.6, 1.1, 0.0}, steep);
+    ASSERT_TRUE(extended.hit && extended.hit->opening);
+    EXPECT_NEAR(extended.light.radiance.r, 10.0f, 0.2f);
+}
+
+TEST(RoomLight, ReprojectedLightKeepsTheProbesIrradiance)
+{
+    const SceneProxy proxy(roomWithWindow());
+    const glm::dvec3 center(0.2, 1.2, -0.3);
+    const EnvironmentMap probe = environmentOf(128, [](glm::dvec3 d) {
+        return Rgb(static_cast<float>(1.0 + d.x), static_cast<float>(1.2 + d.y * d.y), 1.0f);
+    });
+    RoomLightOptions options = coarse();
+    options.fit_unseen_outside = false;
+    const RoomLight light(proxy, probe, center, std::nullopt, options, g_silent);
+    for (const glm::dvec3& normal : {glm::dvec3(0, 1, 0), glm::dvec3(1, 0, 0)}) {
+        glm::dvec3 sum(0.0);
+        const int height = 200;
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < 2 * height; ++x) {
+                const glm::dvec3 d =
+                    environmentDirectionFromUv({(x + 0.5) / (2.0 * height), (y + 0.5) / height});
+                const double cosine = glm::dot(d, normal);
+                if (cosine > 0.0)
+                    sum += glm::dvec3(light.incident(center, d).radiance) *
+                           (cosine * environmentTexelSolidAngle(2 * height, height, y));
+            }
+        const glm::dvec3 expected = irradiance(probe, normal);
+        // Texels of 5 cm at 1 m: half a per cent.
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(sum[c], expected[c], 0.005 * expected[c]);
+    }
+}
+
+TEST(RoomLight, LightSamplingAgreesWithCosineSampling)
+{
+    const SceneProxy proxy(roomWithWindow());
+    const EnvironmentMap probe = environmentOf(128, [](glm::dvec3 d) {
+        return d.x > 0.85 ? Rgb(20.0f) : Rgb(static_cast<float>(0.6 + 0.5 * d.y));
+    });
+    const RoomLight light(proxy, probe, {0, 1.4, 0}, std::nullopt, coarse(), g_silent);
+    const glm::dvec3 x(-0.6, 0.0, -0.9);
+    const glm::dvec3 normal(0, 1, 0);
+    const int count = 60000;
+    double by_light = 0.0;
+    double by_light_square = 0.0;
+    double by_cosine = 0.0;
+    double by_cosine_square = 0.0;
+    for (int i = 0; i < count; ++i) {
+        RandomStream random(7, 0, static_cast<std::uint64_t>(i));
+        const double selector = random.uniformDouble();
+        const auto drawn = light.sample(x, selector, random.uniform2());
+        const double a = drawn ? drawn->radiance.g *
+                                     std::max(0.0, glm::dot(drawn->direction, normal)) / drawn->pdf
+                               : 0.0;
+        const double b =
+            light.incident(x, frameFromNormal(normal) * cosineHemisphere(random.uniform2()))
+                .radiance.g *
+            pi;
+        by_light += a;
+        by_light_square += a * a;
+        by_cosine += b;
+        by_cosine_square += b * b;
+    }
+    const auto varianceOfMean = [&](double sum, double square) {
+        return (square / count - sum * sum / count / count) / count;
+    };
+    // Extended directions are drawn rarely but not never: both estimates are of the same integral.
+    const double sigma = std::sqrt(varianceOfMean(by_light, by_light_square) +
+                                   varianceOfMean(by_cosine, by_cosine_square));
+    EXPECT_NEAR(by_light / count, by_cosine / count, tolerance::kStandardErrors * sigma);
+    EXPECT_LT(sigma, 0.02 * by_cosine / count);
+}
+
+TEST(RoomLight, SurfacesNobodySawGatherLight)
+{
+    RoomDescription room = closedRoom();
+    room.boxes.push_back({{-1, 0, -2}, {0, 1, -1}, true, "cupboard"});
+    const SceneProxy proxy(room);
+    const EnvironmentMap white = environmentOf(64, [](glm::dvec3) { return Rgb(1.0f); });
+    const RoomLight light(proxy, white, {-0.5, 0.6, 1.0}, std::nullopt, coarse(), g_silent);
+    EXPECT_TRUE(hasFinding(light.findings(), "light-unseen-surfaces"));
+    // The cupboard's back looks at lit walls: it reflects some of it, never more than it gets.
+    const Rgb back = light.incident({-0.5, 0.5, -2.9}, {0, 0, 1}).radiance;
+    EXPECT_GT(back.g, 0.3f);
+    EXPECT_LT(back.g, 1.0f);
+}
+
+TEST(RoomLight, PhotographStandsInForTheProbe)
+{
+    RoomDescription room = closedRoom();
+    room.boxes.push_back({{-1, 0, -2}, {0, 1, -1}, true, "cupboard"});
+    const SceneProxy proxy(room);
+    const EnvironmentMap white = environmentOf(64, [](glm::dvec3) { return Rgb(1.0f); });
+    // The probe stands before the cupboard, the camera beside it sees its +x side.
+    const Camera camera = Camera::lookAt({1.8, 1.2, -1.6}, {0.0, 0.5, -1.5}, 300.0, 320, 240);
+    const PhotographedRadiance photo{camera, Image<Rgb>(320, 240, Rgb(0.25f))};
+    const RoomLight light(proxy, white, {-0.5, 0.6, 1.0}, photo, coarse(), g_silent);
+    EXPECT_NEAR(light.incident({1.0, 0.5, -1.5}, {-1, 0, 0}).radiance.g, 0.25f, 1e-4f);
+    EXPECT_EQ(light.probeRadiance(light.arrive({1.0, 0.5, -1.5}, {-1, 0, 0}).hit->face, {0.5, 0.5}),
+              Rgb(0.0f));
+}
+
+}  // namespace
+}  // namespace insitu
