@@ -73,6 +73,8 @@ struct Case {
     Image<Rgb> panorama;
 };
 
+/// The table has 256 steps of exposure: its first one spans codes 0 to 10–20, in which the camera
+/// goes on as the power law of the next steps (its dark pixels show it), not as a straight line.
 ResponseCurve truthCurve(const Json& response)
 {
     ResponseCurve curve;
@@ -80,8 +82,13 @@ ResponseCurve truthCurve(const Json& response)
     for (std::size_t c = 0; c < 3; ++c) {
         const auto codes = response.at("curve").at(c).get<std::vector<double>>();
         const auto last = static_cast<double>(codes.size() - 1);
+        const double gamma = std::log2(codes[2] / codes[1]);
         for (std::size_t z = 0; z < 256; ++z) {
             const double target = static_cast<double>(z) / 255.0;
+            if (target < codes[1]) {
+                curve.exposure[c][z] = std::pow(target / codes[1], 1.0 / gamma) / last;
+                continue;
+            }
             const auto above = std::upper_bound(codes.begin() + 1, codes.end() - 1, target);
             const double span = above[0] - above[-1];
             const double t = std::clamp((target - above[-1]) / span, 0.0, 1.0);
@@ -137,27 +144,33 @@ void printResponseError(const ResponseRecovery& recovery, const ResponseCurve& t
     for (std::size_t c = 0; c < 3; ++c) {
         std::array<double, 256> error{};
         double mean = 0.0;
+        double bright_mean = 0.0;
         for (std::size_t z = 8; z <= 248; ++z) {
             error[z] = std::log2(recovery.curve.exposure[c][z] / truth.exposure[c][z]);
             mean += error[z] / 241.0;
+            if (z >= 24) bright_mean += error[z] / 225.0;
         }
         double squares = 0.0;
         double dark = 0.0;
+        double bright = 0.0;
         double largest = 0.0;
         std::size_t where = 0;
         for (std::size_t z = 8; z <= 248; ++z) {
             const double e = error[z] - mean;
             squares += e * e / 241.0;
-            if (z < 32) dark += e * e / 24.0;
+            if (z < 24) dark += e * e / 16.0;
+            if (z >= 24) bright += (error[z] - bright_mean) * (error[z] - bright_mean) / 225.0;
             if (std::abs(e) > largest) where = z;
             largest = std::max(largest, std::abs(e));
         }
         fmt::print(
-            "  response {}: {:.4f} EV RMS (codes 8-31 {:.4f}), largest {:.3f} at code {}, "
+            "  response {}: {:.4f} EV RMS (codes 8-23 {:.4f}, 24-248 {:.4f}), largest {:.3f} at "
+            "code {}, "
             "residual {:.4f}\n",
             "rgb"[c],
             std::sqrt(squares),
             std::sqrt(dark),
+            std::sqrt(bright),
             largest,
             where,
             recovery.residual[c]);

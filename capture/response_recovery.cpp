@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace insitu {
 
@@ -23,6 +24,8 @@ using detail::ResponseSolution;
 
 /// Fewer patches than this cannot carry a curve.
 constexpr std::size_t kFewestPatches = 20;
+/// Exposures nearer than this are no two exposures.
+constexpr double kLeastRatio = 1.01;
 /// Smallest step of ln(exposure) between codes after the monotone fix.
 constexpr double kSmallestStep = 1e-5;
 /// Codes that every channel's samples should reach; else the curve's ends are extrapolated.
@@ -62,11 +65,16 @@ std::vector<PatchObservations> observeChannel(const Bracket& bracket,
     std::vector<PatchObservations> patches;
     for (const ResponseSample sample : samples) {
         PatchObservations patch;
-        for (const BracketFrame& frame : bracket.frames)
-            if (detail::usefulMeanCode(frame.image, sample, channel) >= 0.0)
-                patch.push_back(observe(frame, sample, channel));
-        if (patch.size() < 2) continue;
-        if (patch.front().log_exposure - patch.back().log_exposure < 0.01) continue;
+        double longest = 0.0;
+        double shortest = std::numeric_limits<double>::infinity();
+        for (const BracketFrame& frame : bracket.frames) {
+            patch.push_back(observe(frame, sample, channel));
+            patch.back().clean = detail::usefulMeanCode(frame.image, sample, channel) >= 0.0;
+            if (!patch.back().clean) continue;
+            longest = std::max(longest, frame.relative_exposure);
+            shortest = std::min(shortest, frame.relative_exposure);
+        }
+        if (longest < kLeastRatio * shortest) continue;
         patches.push_back(std::move(patch));
     }
     return patches;
@@ -124,6 +132,7 @@ void reportReach(const std::array<std::vector<PatchObservations>, 3>& channels, 
         double channel_high = 0.0;
         for (const PatchObservations& patch : patches) {
             for (const PatchObservation& o : patch) {
+                if (!o.clean) continue;
                 channel_low = std::min(channel_low, o.mean_code);
                 channel_high = std::max(channel_high, o.mean_code);
             }

@@ -14,7 +14,7 @@ struct ResponseOptions {
     int samples = 1500;
     /// Weight of the penalty on bends of the curve ([DebMal97] eq. 3, lambda; see
     /// response_solve.cpp). Unitless, > 0.
-    double smoothness = 30.0;
+    double smoothness = 100.0;
 
     /// Every problem at once, so that one run reports them all.
     [[nodiscard]] Findings validate() const;

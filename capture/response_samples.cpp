@@ -117,14 +117,21 @@ int takeFrom(std::vector<Candidate>& candidates,
 
 double usefulMeanCode(const EncodedImage& image, ResponseSample sample, int channel)
 {
-    double sum = 0.0;
-    for (int y = sample.y; y < sample.y + kPatchSide; ++y) {
-        for (int x = sample.x; x < sample.x + kPatchSide; ++x) {
-            const double code = codeOn255(image, x, y, channel);
-            if (code > kHighestUsefulCode) return -1.0;
-            sum += code;
+    const int limit = static_cast<int>(kHighestUsefulCode / 255.0 * image.max_code);
+    const int left = std::max(sample.x - kPatchMargin, 0);
+    const int top = std::max(sample.y - kPatchMargin, 0);
+    const int right = std::min(sample.x + kPatchSide + kPatchMargin, image.codes.width());
+    const int bottom = std::min(sample.y + kPatchSide + kPatchMargin, image.codes.height());
+    for (int y = top; y < bottom; ++y) {
+        for (int x = left; x < right; ++x) {
+            const glm::u16vec3 codes = image.codes(x, y);
+            if (std::max({codes.r, codes.g, codes.b}) > limit) return -1.0;
         }
     }
+    double sum = 0.0;
+    for (int y = sample.y; y < sample.y + kPatchSide; ++y)
+        for (int x = sample.x; x < sample.x + kPatchSide; ++x)
+            sum += codeOn255(image, x, y, channel);
     const double mean = sum / (kPatchSide * kPatchSide);
     return mean >= kLowestUsefulMean ? mean : -1.0;
 }

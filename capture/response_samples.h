@@ -15,7 +15,10 @@ namespace insitu::detail {
 
 /// Side of the square patches that serve as samples of the response. Pixels.
 inline constexpr int kPatchSide = 5;
-/// A patch with a code above this (of 255) in some pixel says nothing in that frame and channel.
+/// Neighbours that share a JPEG's colour with the patch. Pixels.
+inline constexpr int kPatchMargin = 2;
+/// A patch with a code above this (of 255) in some pixel or neighbour and in any channel says
+/// nothing in that frame: JPEG mixes colours, so a clipped channel falsifies the others.
 inline constexpr double kHighestUsefulCode = 251.0;
 /// The same for a mean code below this: mostly noise and the sensor's floor.
 inline constexpr double kLowestUsefulMean = 3.0;
@@ -31,7 +34,7 @@ struct ResponseSample {
 /// deterministic.
 [[nodiscard]] std::vector<ResponseSample> selectResponseSamples(const Bracket& bracket, int count);
 
-/// Mean code of the patch in frame and channel when it is useful there (see above), else < 0.
+/// Mean code of the patch in one channel when the frame is useful there (see above), else < 0.
 [[nodiscard]] double usefulMeanCode(const EncodedImage& image, ResponseSample sample, int channel);
 
 }  // namespace insitu::detail

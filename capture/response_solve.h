@@ -11,6 +11,7 @@ struct PatchObservation {
     double log_exposure = 0.0;  ///< ln of the frame's relative exposure
     double mean_code = 0.0;     ///< of 255
     double code_variance = 0.0;
+    bool clean = false;  ///< no pixel near the ends of the codes, see usefulMeanCode
     /// Share of the patch's pixels at each table entry, ascending; the shares sum to 1.
     std::vector<std::pair<int, double>> histogram;
 };
