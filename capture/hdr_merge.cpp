@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 // Every frame k that is good at a pixel estimates its radiance as x_k / t_k, x the linearised

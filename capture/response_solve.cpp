@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 // The problem. A patch i of constant radiance exp(E_i) is seen by frame k with exposure t_k; the
 // mean of its decoded pixels must be t_k exp(E_i). With g = ln(exposure by code) and h_z the share

@@ -1,0 +1,148 @@
+#include "core/io/exif.h"
+#include "core/io/image_io.h"
+#include "core/io/json.h"
+#include "tests/capture/synthetic_bracket.h"
+#include "tests/cli/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+#include <gmock/gmock.h>
+
+namespace insitu {
+namespace {
+
+using testing::HasSubstr;
+
+/// A bracket of tiles on disk, as PNG (no EXIF) or JPEG (with exposure times).
+class MergeAndProbe : public testing::Test {
+protected:
+    void SetUp() override
+    {
+        SyntheticCamera camera;
+        camera.curve = [](int, double e) { return std::pow(e, 0.45); };
+        scene_ = tiles(160, 160, 8, 0.01, 20.0);
+        const Bracket bracket = photograph(scene_, seconds_, camera);
+        for (const BracketFrame& frame : bracket.frames) {
+            PhotoMetadata metadata;
+            metadata.exposure.seconds = frame.relative_exposure;
+            const auto name = folder_ / (frame.name + ".jpg");
+            writeEncoded(name, frame.image, makeExif(metadata));
+            writeEncoded(folder_ / (frame.name + ".png"), frame.image);
+        }
+    }
+
+    std::vector<std::string> command(const std::string& name,
+                                     const std::string& extension,
+                                     std::vector<std::string> more) const
+    {
+        std::vector<std::string> arguments = {name};
+        for (std::size_t k = 0; k < seconds_.size(); ++k)
+            arguments.push_back((folder_ / fmt::format("frame_{}{}", k, extension)).string());
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return arguments;
+    }
+    std::string file(const std::string& name) const { return (folder_ / name).string(); }
+
+    TemporaryFolder folder_;
+    Image<Rgb> scene_;
+    std::vector<double> seconds_ = {1.0, 0.5, 0.25, 0.125, 1.0 / 16};
+};
+
+TEST_F(MergeAndProbe, MergeRecoversTheSceneUpToOneScaleAChannel)
+{
+    const ProgramRun run = runProgram(
+        command("merge", ".jpg", {"-o", file("room.exr"), "--save-response", file("r.json")}));
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    const Image<Rgb> radiance = readRadiance(file("room.exr")).pixels;
+    const auto ratio = [&](int x, int y) { return radiance(x, y).g / scene_(x, y).g; };
+    // Middles of tiles of middle brightness.
+    EXPECT_NEAR(ratio(20, 60) / ratio(20, 140), 1.0, 0.03);  // rounding and JPEG, 3 %
+    EXPECT_NEAR(ratio(20, 100) / ratio(20, 140), 1.0, 0.03);
+
+    const ProgramRun again = runProgram(
+        command("merge", ".jpg", {"-o", file("again.exr"), "--response", file("r.json")}));
+    ASSERT_EQ(again.exit_code, 0) << again.messages;
+    const Image<Rgb> same = readRadiance(file("again.exr")).pixels;
+    EXPECT_NEAR(same(20, 100).g / radiance(20, 100).g, 1.0, 1e-5);
+}
+
+TEST_F(MergeAndProbe, ExposuresAreAskedForAndTaken)
+{
+    const ProgramRun without = runProgram(command("merge", ".png", {"-o", file("room.exr")}));
+    EXPECT_EQ(without.exit_code, 1);
+    EXPECT_THAT(without.messages, HasSubstr("frame_0.png: no exposure time in EXIF"));
+    const ProgramRun with = runProgram(
+        command("merge", ".png", {"-o", file("room.exr"), "--exposures", "1,1/2,0.25,1/8,1/16"}));
+    EXPECT_EQ(with.exit_code, 0) << with.messages;
+    for (const char* bad : {"1,1/2", "1,1/0,1,1,1", "1,-2,1,1,1", "1,x,1,1,1"}) {
+        const ProgramRun run =
+            runProgram(command("merge", ".png", {"-o", file("bad.exr"), "--exposures", bad}));
+        EXPECT_EQ(run.exit_code, 1) << bad;
+        EXPECT_THAT(run.messages, HasSubstr("--exposures")) << bad;
+    }
+}
+
+TEST_F(MergeAndProbe, OneExposureIsAWarningAndStrictSaysSo)
+{
+    const std::vector<std::string> arguments = {
+        "merge", file("frame_1.jpg"), "-o", file("one.exr"), "--strict"};
+    const ProgramRun run = runProgram(arguments);
+    EXPECT_EQ(run.exit_code, 4);
+    EXPECT_THAT(run.messages, HasSubstr("bracket-single-exposure"));
+    EXPECT_THAT(run.messages, HasSubstr("response-not-recoverable"));
+}
+
+TEST_F(MergeAndProbe, RefusesToOverwriteAndToWriteAPhotograph)
+{
+    writeRadiance(file("there.exr"), scene_);
+    EXPECT_EQ(runProgram(command("merge", ".jpg", {"-o", file("there.exr")})).exit_code, 1);
+    EXPECT_EQ(runProgram(command("merge", ".jpg", {"-o", file("there.exr"), "--force"})).exit_code,
+              0);
+    EXPECT_EQ(runProgram(command("merge", ".jpg", {"-o", file("room.png")})).exit_code, 1);
+}
+
+TEST_F(MergeAndProbe, ProbeMakesAnEnvironmentOfEachKind)
+{
+    writeRadiance(file("ball.exr"), Image<Rgb>(160, 160, Rgb(2.0f)));
+    const ProgramRun ball = runProgram({"probe",
+                                        file("ball.exr"),
+                                        "-o",
+                                        file("env.exr"),
+                                        "--center",
+                                        "80,80",
+                                        "--radius",
+                                        "70",
+                                        "--reflectance",
+                                        "0.5",
+                                        "--view-position",
+                                        "0.5,1,2",
+                                        "--width",
+                                        "128"});
+    ASSERT_EQ(ball.exit_code, 0) << ball.messages;
+    EXPECT_THAT(ball.messages, HasSubstr("probe-blind-spot"));
+    const Image<Rgb> environment = readRadiance(file("env.exr")).pixels;
+    EXPECT_EQ(environment.width(), 128);
+    EXPECT_EQ(environment.height(), 64);
+    EXPECT_NEAR(environment(64, 32).r, 4.0f, 1e-5f);
+
+    EXPECT_EQ(
+        runProgram({"probe", file("ball.exr"), "-o", file("a.exr"), "--kind", "angular"}).exit_code,
+        0);
+    writeRadiance(file("map.exr"), Image<Rgb>(64, 32, Rgb(1.0f)));
+    EXPECT_EQ(
+        runProgram({"probe", file("map.exr"), "-o", file("l.exr"), "--kind", "latlong"}).exit_code,
+        0);
+    EXPECT_EQ(
+        runProgram({"probe", file("ball.exr"), "-o", file("w.exr"), "--kind", "latlong"}).exit_code,
+        1);
+}
+
+TEST_F(MergeAndProbe, ProbeMergesABracketAndSaysWhatItAssumed)
+{
+    const ProgramRun run = runProgram(command("probe", ".jpg", {"-o", file("env.exr")}));
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    EXPECT_THAT(run.messages, HasSubstr("probe-outline-assumed"));
+    EXPECT_THAT(run.messages, HasSubstr("probe-view-assumed"));
+}
+
+}  // namespace
+}  // namespace insitu
