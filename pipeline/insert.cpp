@@ -134,23 +134,16 @@ void matchLightToPhoto(const Image<Rgb>& photo, bool unit_known, InsertResult& r
                      100.0 * result.light_to_photo_spread)});
 }
 
-/// Objects into the world; an object no light of the room can reach is a mistake.
-ObjectScene placeObjects(const Project& project, const SceneProxy& proxy, InsertResult& result)
+/// Objects into the world; what looks like a wrong scale or place is a finding.
+ObjectScene placeObjects(const Project& project, InsertResult& result)
 {
     std::vector<ObjectScene::Object> objects;
     for (const ProjectObject& wanted : project.objects) {
         ObjectScene::Object object{loadPlaced(wanted)};
         append(result.findings, object.model.findings);
         const BoundingBox box = boundingBox(object.model.mesh);
-        const double extent = glm::length(box.max - box.min);
-        if (extent < 1e-3 || extent > 50.0)
-            result.findings.push_back(
-                {Severity::Warning,
-                 "object-extent-implausible",
-                 fmt::format(
-                     "{} is {:.4g} m across; is its \"scale\" right (0.01 for centimetres)?",
-                     wanted.model.string(),
-                     extent)});
+        if (const auto finding = extentFinding(box, wanted.model.string()))
+            result.findings.push_back(*finding);
         for (const RoomBox& room : project.room.boxes) {
             const double slack = 0.005;
             if (!room.solid && (glm::any(glm::lessThan(box.min, room.min_m - slack)) ||
@@ -162,7 +155,6 @@ ObjectScene placeObjects(const Project& project, const SceneProxy& proxy, Insert
         }
         objects.push_back(std::move(object));
     }
-    (void)proxy;
     return ObjectScene(std::move(objects));
 }
 
@@ -214,15 +206,15 @@ InsertResult insertObjects(const Project& project, const InsertOptions& options,
     const Camera& camera = result.camera.camera;
     watch.lap("camera");
 
+    const ObjectScene objects = placeObjects(project, result);
+    watch.lap("models");
+
     const SceneProxy proxy(project.room);
     append(result.findings, proxy.findings());
     result.light = captureLight(project, proxy, camera, options);
     append(result.findings, result.light.findings);
     choosePhotoResponse(project, result);
     watch.lap("probe");
-
-    const ObjectScene objects = placeObjects(project, proxy, result);
-    watch.lap("models");
 
     // The photograph stands in for surfaces the probe did not see, where both share a unit.
     const Image<Rgb> photo_radiance = photographedRadiance(

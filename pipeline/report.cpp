@@ -57,7 +57,6 @@ void writeReport(const std::filesystem::path& path,
     Json times = Json::object();
     for (const StageTime& time : result.times)
         times[time.stage] = time.seconds;
-    const double half_code = options.composite.influence_codes;
     const Json report = {
         {"format", "insitu-report"},
         {"version", 1},
@@ -83,7 +82,7 @@ void writeReport(const std::filesystem::path& path,
           {"ratio_standard_error", result.render.ratio_error}}},
         {"composite",
          {{"form", options.composite.form == CompositeForm::Ratio ? "ratio" : "difference"},
-          {"influence_codes", half_code},
+          {"influence_codes", options.composite.influence_codes},
           {"influence_fraction", result.composite.influence_fraction}}},
         {"findings", findingsJson(result.findings)},
         {"seconds", times}};

@@ -15,6 +15,10 @@ namespace {
 /// Samples between two looks at a pixel's error.
 constexpr int kBatch = 8;
 
+/// Receivers may be this much noisier than the target: their neighbours are averaged afterwards,
+/// which takes a factor of ten and more.
+constexpr double kReceiverSlack = 3.0;
+
 /// Sums of one pixel's samples.
 struct PixelSums {
     int count = 0;
@@ -63,8 +67,9 @@ struct PixelSums {
     {
         const double object_mean = static_cast<double>(luminance(Rgb(object))) / count;
         const double scale = std::max(object_mean, 1e-12);
-        return ratioVariance() <= target * target &&
-               objectVariance() <= 4.0 * target * target * scale * scale;
+        const double ratio_target = kReceiverSlack * target;
+        return ratioVariance() <= ratio_target * ratio_target &&
+               objectVariance() <= target * target * scale * scale;
     }
 };
 

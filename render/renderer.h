@@ -22,9 +22,10 @@ struct InsertionOptions {
     int max_samples = 256;
     /// Fewest, before a pixel may stop early, in [1, max_samples].
     int min_samples = 16;
-    /// A pixel stops when the standard error of its with/without ratio and of its object radiance
-    /// (relative) falls below this, before neighbours are averaged. >= 0; 0 = always max_samples.
-    double target_error = 0.01;
+    /// A pixel stops when the relative standard error of its object radiance is below this and that
+    /// of its with/without ratio below three times this (neighbours are averaged afterwards).
+    /// >= 0; 0 = always max_samples.
+    double target_error = 0.015;
     /// Stop after this many seconds; 0 = no limit. With a limit the result depends on the machine.
     double max_seconds = 0.0;
     std::uint64_t seed = 1;
