@@ -27,6 +27,8 @@ constexpr double kCodeVariance = 1.0 / 12.0;
 /// twice the black limit above it: otherwise steps in radiance show where a frame drops out.
 constexpr double kFadeFraction = 0.06;
 
+/// Codes above this fraction are never noise: read noise reaches a seventh at three sigma.
+constexpr double kSureFraction = 0.25;
 /// Beside a clipped channel, codes above this fraction count as clipped too.
 constexpr double kSuspectFraction = 0.8;
 
@@ -37,6 +39,7 @@ struct FrameView {
     double to_255;
     int clip_code;
     int suspect_code;
+    int sure_code;
     int black_code;
 };
 
@@ -58,6 +61,7 @@ public:
                                255.0 / top,
                                static_cast<int>(std::floor(options.clip_fraction * top)),
                                static_cast<int>(kSuspectFraction * top),
+                               static_cast<int>(kSureFraction * top),
                                static_cast<int>(std::ceil(options.black_fraction * top))});
         }
     }
@@ -145,10 +149,15 @@ private:
         return nullptr;
     }
 
-    /// Could `frame` show this radiance well above black? If not, a code above black is noise: it
-    /// must not speak for the pixel, however little the other frames are trusted.
-    [[nodiscard]] bool reaches(const FrameView& frame, int c, double radiance) const
+    /// Is a code of `frame` more than noise, when the longest unclipped frame says `radiance`? A
+    /// code just above black is believed only when that radiance could give it; a bright one always
+    /// is (the longer frame may be wrong beside a lamp: a picture that was scaled down, blooming).
+    [[nodiscard]] bool isSignal(const FrameView& frame,
+                                int c,
+                                int code_value,
+                                double radiance) const
     {
+        if (code_value > frame.sure_code) return true;
         const double least = response_.decode(c, 2.0 * frame.black_code * frame.to_255);
         return radiance * frame.exposure >= least;
     }
@@ -173,9 +182,9 @@ private:
             double weights = 0.0;
             for (const FrameView& frame : frames_) {
                 if (!isGood(frame, x, y, c)) continue;
-                if (&frame != longest && !reaches(frame, c, predicted)) continue;
-                if (!beside_allowed && besideClipped(frame, x, y)) continue;
                 const int value = code(frame, x, y, c);
+                if (&frame != longest && !isSignal(frame, c, value, predicted)) continue;
+                if (!beside_allowed && besideClipped(frame, x, y)) continue;
                 const double w = weight(frame, c, value, predicted);
                 sum += w * radianceOf(frame, c, value);
                 weights += w;

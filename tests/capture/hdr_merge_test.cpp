@@ -144,6 +144,16 @@ TEST(MergeBracket, DoesNotTakeNoiseInAShortFrameForLight)
     EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 3600.0f / 65536.0f / 1024.0f);
 }
 
+// The rim of a lamp in a picture that was scaled down: the long frame mixes clipped and dark pixels
+// to a middle code, the short one shows what is there.
+TEST(MergeBracket, BelievesABrightShortFrameBesideALamp)
+{
+    const Bracket bracket =
+        makeBracket({frameOf({100, 255, 255}, 1024.0), frameOf({120, 200, 200}, 1.0)});
+    const MergeResult merged = mergeBracket(bracket, squares(), {});
+    EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 14400.0f / 65536.0f);
+}
+
 // Weights t^2/var: the mean over many noisy pixels is unbiased and its spread is near that of the
 // longest unclipped frame, not of the noisiest.
 TEST(MergeBracket, IsUnbiasedAndAsQuietAsTheBestFrame)
