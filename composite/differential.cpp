@@ -14,6 +14,8 @@ namespace insitu {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
+/// Side of the neighbourhood that tells noise from clipping, pixels: wider than JPEG's 8x8 blocks.
+constexpr int kClipWindow = 11;
 
 /// Mean over a square window (clamped at the border), separable running sums.
 Image<Rgb> boxFilter(const Image<Rgb>& image, int window)
@@ -63,12 +65,20 @@ Image<Rgb> reflectanceOverPi(const Image<Rgb>& photo,
 /// Raises clipped channels to what the light probe knows of them; returns how many pixels had any.
 ///
 /// Where another channel of the pixel is not clipped it gives the level and the probe only the
-/// colour, since the probe sees the surface less sharply than the photograph does.
+/// colour, since the probe sees the surface less sharply than the photograph does. A clipped pixel
+/// among unclipped ones is clipped by its noise and lies near the bound: the probe counts by how
+/// far more than half of the neighbourhood is clipped.
 std::size_t restoreClipped(const EncodedImage& photo,
                            const Image<Rgb>& probe,
                            double clip_code,
                            Image<Rgb>& radiance)
 {
+    Image<Rgb> is_clipped(radiance.width(), radiance.height());
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i)
+        for (int c = 0; c < 3; ++c)
+            is_clipped.pixels()[i][c] = photo.codes.pixels()[i][c] >= clip_code ? 1.0f : 0.0f;
+    const Image<Rgb> clipped_share = boxFilter(is_clipped, kClipWindow);
+
     std::size_t count = 0;
     for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
         const glm::u16vec3 code = photo.codes.pixels()[i];
@@ -88,8 +98,11 @@ std::size_t restoreClipped(const EncodedImage& photo,
         if (!any) continue;
         ++count;
         const float level = known_probe > 0.0f ? known / known_probe : 1.0f;
-        for (int c = 0; c < 3; ++c)
-            if (code[c] >= clip_code) value[c] = std::max(value[c], level * seen[c]);
+        for (int c = 0; c < 3; ++c) {
+            if (code[c] < clip_code) continue;
+            const float belief = std::clamp(2.0f * clipped_share.pixels()[i][c] - 1.0f, 0.0f, 1.0f);
+            value[c] += belief * std::max(0.0f, level * seen[c] - value[c]);
+        }
     }
     return count;
 }

@@ -13,29 +13,33 @@ namespace {
 
 /// B3 spline, [Dammertz10] section 2.
 constexpr std::array<float, 5> kKernel = {1.0f / 16, 1.0f / 4, 3.0f / 8, 1.0f / 4, 1.0f / 16};
-constexpr std::array<float, 3> kGauss = {0.25f, 0.5f, 0.25f};
+/// Half side of the square over which variances are averaged, pixels.
+constexpr int kVarianceReach = 3;
 
-/// Variances estimated from few samples are noisy themselves: 3x3 mean over the same surface.
+/// Mean over a square of the same surface. A variance estimated from few samples is
+/// noisy itself: a pixel that drew no light by chance would seem certain of its darkness.
 Image<float> smoothedVariance(const Image<float>& variance, const Image<std::int32_t>& surface)
 {
-    Image<float> smooth(variance.width(), variance.height());
-    parallelFor(0, variance.height(), [&](std::int64_t row) {
+    const int width = variance.width();
+    const int height = variance.height();
+    Image<float> smooth(width, height);
+    parallelFor(0, height, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
-        for (int x = 0; x < variance.width(); ++x) {
+        for (int x = 0; x < width; ++x) {
             float sum = 0.0f;
-            float weights = 0.0f;
-            for (int dy = -1; dy <= 1; ++dy) {
-                for (int dx = -1; dx <= 1; ++dx) {
-                    const int qx = std::clamp(x + dx, 0, variance.width() - 1);
-                    const int qy = std::clamp(y + dy, 0, variance.height() - 1);
+            float count = 0.0f;
+            for (int qy = std::max(0, y - kVarianceReach);
+                 qy <= std::min(height - 1, y + kVarianceReach);
+                 ++qy) {
+                for (int qx = std::max(0, x - kVarianceReach);
+                     qx <= std::min(width - 1, x + kVarianceReach);
+                     ++qx) {
                     if (surface(qx, qy) != surface(x, y)) continue;
-                    const float w = kGauss[static_cast<std::size_t>(dx + 1)] *
-                                    kGauss[static_cast<std::size_t>(dy + 1)];
-                    sum += w * variance(qx, qy);
-                    weights += w;
+                    sum += variance(qx, qy);
+                    count += 1.0f;
                 }
             }
-            smooth(x, y) = sum / weights;
+            smooth(x, y) = sum / count;
         }
     });
     return smooth;

@@ -15,7 +15,7 @@ namespace insitu {
 /// [Schied17], 5x5 B3 spline, `levels` scales.
 struct IrradianceFilterOptions {
     int levels = 4;             ///< reach 2^(levels+1) pixels; 0: no filter
-    double range_sigmas = 2.0;  ///< how many standard deviations a neighbour may differ, > 0
+    double range_sigmas = 3.0;  ///< how many standard deviations a neighbour may differ, > 0
 };
 
 /// values     per pixel; `variance` is that of the luminance of each, >= 0
