@@ -3,7 +3,6 @@
 #include "render/renderer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <vector>
@@ -132,6 +131,29 @@ private:
     const InsertionOptions& options_;
 };
 
+/// Pixels that need more samples: the noisy ones and those around them, since a pixel may seem
+/// quiet because it drew no light by chance. All of them when the target is negative.
+Image<std::uint8_t> noisyPixels(const std::vector<PixelSums>& sums,
+                                int width,
+                                int height,
+                                double target)
+{
+    constexpr int kReach = 2;
+    if (target < 0.0) return Image<std::uint8_t>(width, height, 1);
+    Image<std::uint8_t> noisy(width, height);
+    for (std::size_t i = 0; i < sums.size(); ++i)
+        noisy.pixels()[i] = !sums[i].quiet(target);
+    Image<std::uint8_t> grown(width, height);
+    parallelFor(0, height, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < width; ++x)
+            for (int qy = std::max(0, y - kReach); qy <= std::min(height - 1, y + kReach); ++qy)
+                for (int qx = std::max(0, x - kReach); qx <= std::min(width - 1, x + kReach); ++qx)
+                    grown(x, y) |= noisy(qx, qy);
+    });
+    return grown;
+}
+
 RenderLayers emptyLayers(int width, int height)
 {
     RenderLayers layers;
@@ -229,17 +251,16 @@ InsertionResult renderInsertion(const Camera& camera,
         const int goal = std::min(
             options.max_samples,
             reached == 0 ? options.min_samples : std::max(reached + kBatch, reached * 5 / 4));
-        std::atomic<int> rows_done{0};
+        const Image<std::uint8_t> active =
+            noisyPixels(sums, width, height, reached == 0 ? -1.0 : options.target_error);
         parallelFor(0, height, [&](std::int64_t y) {
             if (progress.cancelled()) return;
             for (int x = 0; x < width; ++x) {
+                if (!active(x, static_cast<int>(y))) continue;
                 PixelSums& pixel = sums[static_cast<std::size_t>(y * width + x)];
-                if (reached > 0 && (pixel.count < reached || pixel.quiet(options.target_error)))
-                    continue;
                 while (pixel.count < goal)
                     sampler.add(x, static_cast<int>(y), pixel);
             }
-            rows_done.fetch_add(1);
         });
         progress.checkpoint();
         reached = goal;

@@ -23,9 +23,10 @@ struct InsertionOptions {
     /// Fewest, before a pixel may stop early, in [1, max_samples].
     int min_samples = 16;
     /// A pixel stops when the relative standard error of its object radiance is below this and that
-    /// of its with/without ratio below three times this (neighbours are averaged afterwards).
+    /// of its with/without ratio below three times this (neighbours are averaged afterwards), for
+    /// it and the pixels around it.
     /// >= 0; 0 = always max_samples.
-    double target_error = 0.015;
+    double target_error = 0.02;
     /// Stop after this many seconds; 0 = no limit. With a limit the result depends on the machine.
     double max_seconds = 0.0;
     std::uint64_t seed = 1;
