@@ -16,8 +16,9 @@ constexpr std::array<float, 5> kKernel = {1.0f / 16, 1.0f / 4, 3.0f / 8, 1.0f / 
 /// Half side of the square over which variances are averaged, pixels.
 constexpr int kVarianceReach = 3;
 
-/// Mean over a square of the same surface. A variance estimated from few samples is
-/// noisy itself: a pixel that drew no light by chance would seem certain of its darkness.
+/// Mean over a square of the same surface, or its own when larger. A variance estimated from few
+/// samples is noisy itself: a pixel that drew no light by chance would seem certain of its
+/// darkness.
 Image<float> smoothedVariance(const Image<float>& variance, const Image<std::int32_t>& surface)
 {
     const int width = variance.width();
@@ -39,7 +40,7 @@ Image<float> smoothedVariance(const Image<float>& variance, const Image<std::int
                     count += 1.0f;
                 }
             }
-            smooth(x, y) = sum / count;
+            smooth(x, y) = std::max(variance(x, y), sum / count);
         }
     });
     return smooth;

@@ -189,7 +189,10 @@ void storeIrradiance(const std::vector<PixelSums>& sums,
     Image<std::int32_t> surface(width, height, -1);
     for (std::size_t i = 0; i < sums.size(); ++i) {
         const PixelSums& pixel = sums[i];
-        if (pixel.receivers == 0) continue;
+        // A pixel that is nearly all window and only just touches the wall has no irradiance to
+        // tell.
+        if (pixel.receivers == 0 || (pixel.covered == 0 && 4 * pixel.receivers < pixel.count))
+            continue;
         const double n = pixel.receivers;
         surface.pixels()[i] = pixel.surface;
         without.pixels()[i] = Rgb(pixel.without / n);

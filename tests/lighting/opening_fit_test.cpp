@@ -54,8 +54,11 @@ TEST(FitOpeningBands, FindsTheSkyThatTheProbeDidNotSee)
     // 600 cells with 10 % of pattern: the strong band within 10 %.
     for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(factors[0][c], truth[0][c], 0.1 * truth[0][c]);
-    for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(factors[1][c], 0.5, 0.35);
+    // The weak band is held by the prior, but leans the right way.
+    for (int c = 0; c < 3; ++c) {
+        EXPECT_LT(factors[1][c], 0.95);
+        EXPECT_GT(factors[1][c], 0.3);
+    }
 }
 
 TEST(FitOpeningBands, ADarkRugDoesNotBendTheLight)
