@@ -151,6 +151,7 @@ Composite compositeDifferential(const EncodedImage& photo,
                                 const RenderLayers& layers,
                                 const CompositeOptions& options)
 {
+    requireValid(options.validate(), "composite options");
     INSITU_CHECK(photo.codes.sameSize(layers.object),
                  "photograph {}x{}, layers {}x{}",
                  photo.codes.width(),

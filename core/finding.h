@@ -1,5 +1,7 @@
 #pragma once
 
+#include "core/check.h"
+
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +33,17 @@ inline void append(Findings& to, Findings from)
     for (const Finding& finding : findings)
         if (finding.code == code) return true;
     return false;
+}
+
+/// InputError with every problem that an options' validate() found, if any: the first thing a stage
+/// does. `what` names the options ("merge options").
+inline void requireValid(const Findings& problems, const std::string& what)
+{
+    if (problems.empty()) return;
+    std::string all;
+    for (const Finding& problem : problems)
+        all += (all.empty() ? "" : "; ") + problem.message;
+    throw InputError(what, all);
 }
 
 [[nodiscard]] inline const char* severityName(Severity severity)

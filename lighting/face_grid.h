@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <vector>
 
 namespace insitu {
@@ -44,6 +45,14 @@ public:
     [[nodiscard]] int columns(std::size_t face) const { return blocks_[face].columns; }
     [[nodiscard]] int rows(std::size_t face) const { return blocks_[face].rows; }
     [[nodiscard]] std::size_t firstOf(std::size_t face) const { return blocks_[face].first; }
+    /// The numbers of a face's texels, row by row.
+    [[nodiscard]] auto texelsOf(std::size_t face) const
+    {
+        const Block& b = blocks_[face];
+        const std::size_t count =
+            static_cast<std::size_t>(b.columns) * static_cast<std::size_t>(b.rows);
+        return std::views::iota(b.first, b.first + count);
+    }
 
     [[nodiscard]] Value& operator[](std::size_t texel) { return values_[texel]; }
     [[nodiscard]] const Value& operator[](std::size_t texel) const { return values_[texel]; }
@@ -73,6 +82,11 @@ public:
     {
         return {(t.column + inside.x) / blocks_[t.face].columns,
                 (t.row + inside.y) / blocks_[t.face].rows};
+    }
+
+    [[nodiscard]] glm::dvec2 centerUv(std::size_t number) const
+    {
+        return uv(texel(number), glm::dvec2(0.5));
     }
 
     /// Bilinear over the valid texels around; `fallback` when there is none.

@@ -21,7 +21,28 @@ double totalArea(const SceneProxy& proxy)
     return sum;
 }
 
+/// The proxy, once the options are found valid: the members are made from both.
+const SceneProxy& checked(const SceneProxy& proxy, const RoomLightOptions& options)
+{
+    requireValid(options.validate(), "light options");
+    return proxy;
+}
+
 }  // namespace
+
+Findings RoomLightOptions::validate() const
+{
+    Findings findings;
+    const auto demand = [&](bool holds, const char* message) {
+        if (!holds) findings.push_back({Severity::Error, "option-out-of-range", message});
+    };
+    demand(texel_m > 0.0 && std::isfinite(texel_m), "texel_m must be > 0");
+    demand(cell_m > 0.0 && std::isfinite(cell_m), "cell_m must be > 0");
+    demand(rays_per_cell > 0, "rays_per_cell must be > 0");
+    demand(std::isfinite(glm::dot(reference_point_m, reference_point_m)),
+           "reference_point_m must be finite");
+    return findings;
+}
 
 RoomLight::RoomLight(const SceneProxy& proxy,
                      const EnvironmentMap& probe,
@@ -29,7 +50,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
                      const std::optional<PhotographedRadiance>& photograph,
                      const RoomLightOptions& options,
                      Progress& progress)
-    : proxy_(proxy),
+    : proxy_(checked(proxy, options)),
       radiance_(proxy, std::max(options.texel_m, std::sqrt(totalArea(proxy) / kMaxTexels))),
       probe_saw_(radiance_.size(), 0),
       photo_saw_(radiance_.size(), 0),
@@ -47,7 +68,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
     // Surfaces that nobody saw need the light that falls on them, which needs all surfaces: twice.
     gatherCells(options, progress);
     fitUnseenOutside(options, progress);
-    reportCoverage();
+    reportCoverage(options.reference_point_m);
     if (hasFinding(findings_, "light-unseen-surfaces")) {
         fillUnseen();
         buildTables(options.reference_point_m);
@@ -71,13 +92,9 @@ void RoomLight::buildTables(glm::dvec3 reference)
     std::vector<double> weights(radiance_.size(), 0.0);
     double surface_power = 0.0;
     for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
+        for (const std::size_t i : radiance_.texelsOf(face)) {
             if (!radiance_.valid(i)) continue;
-            const glm::dvec3 way =
-                proxy_.pointOn(face, radiance_.uv(radiance_.texel(i), glm::dvec2(0.5))) - reference;
+            const glm::dvec3 way = proxy_.pointOn(face, radiance_.centerUv(i)) - reference;
             const double d2 = std::max(glm::dot(way, way), 0.05);
             const double cosine =
                 std::max(std::abs(glm::dot(way, proxy_.faces()[face].normal)) / std::sqrt(d2), 0.1);

@@ -29,6 +29,8 @@ struct RoomLightOptions {
     /// Where the objects stand: light is drawn by what it does there.
     glm::dvec3 reference_point_m{0.0};
     std::uint64_t seed = 1;
+
+    [[nodiscard]] Findings validate() const;
 };
 
 /// The photograph as a second witness of the room's radiance, for what the probe did not see.
@@ -109,7 +111,7 @@ private:
     void fitUnseenOutside(const RoomLightOptions& options, Progress& progress);
     void scaleDoubtfulIrradiance();
     void fillUnseen();
-    void reportCoverage();
+    void reportCoverage(glm::dvec3 reference);
     [[nodiscard]] Rgb faceRadiance(std::size_t face, glm::dvec2 uv) const;
     [[nodiscard]] Rgb radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const;
     [[nodiscard]] double texelArea(std::size_t face) const;

@@ -38,12 +38,8 @@ void RoomLight::findGaps(const EnvironmentMap& probe, glm::dvec3 center)
         const glm::dvec3 normal = proxy_.faces()[face].normal;
         const float limit =
             luminance(Rgb(irradiance(probe, normal))) / std::numbers::pi_v<float> * kGapBrightness;
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
-            const glm::dvec3 point =
-                proxy_.pointOn(face, radiance_.uv(radiance_.texel(i), glm::dvec2(0.5)));
+        for (const std::size_t i : radiance_.texelsOf(face)) {
+            const glm::dvec3 point = proxy_.pointOn(face, radiance_.centerUv(i));
             const glm::dvec3 direction = glm::normalize(point - center);
             if (glm::dot(direction, normal) >= 0.0 || !proxy_.mutuallyVisible(center, point) ||
                 luminance(lookUp(probe, direction)) <= limit)
@@ -108,13 +104,9 @@ void RoomLight::fillFromPhotograph(const PhotographedRadiance& photograph)
     const Camera& camera = photograph.camera;
     parallelFor(0, static_cast<std::int64_t>(radiance_.faceCount()), [&](std::int64_t f) {
         const std::size_t face = static_cast<std::size_t>(f);
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
+        for (const std::size_t i : radiance_.texelsOf(face)) {
             if (probe_saw_[i] || !radiance_.valid(i)) continue;
-            const glm::dvec3 point =
-                proxy_.pointOn(face, radiance_.uv(radiance_.texel(i), glm::dvec2(0.5)));
+            const glm::dvec3 point = proxy_.pointOn(face, radiance_.centerUv(i));
             const auto pixel = camera.project(point);
             if (!pixel || pixel->x < 0 || pixel->y < 0 || pixel->x >= camera.width ||
                 pixel->y >= camera.height || !proxy_.mutuallyVisible(camera.position_m, point))

@@ -174,10 +174,8 @@ void RoomLight::scaleDoubtfulIrradiance()
     for (std::size_t i = 0; i < irradiance_scale_.size(); ++i)
         irradiance_scale_[i] = Rgb(1.0f);
     for (std::size_t face = 0; face < cell_irradiance_.faceCount(); ++face) {
-        const std::size_t begin = cell_irradiance_.firstOf(face);
-        const std::size_t count =
-            static_cast<std::size_t>(cell_irradiance_.columns(face) * cell_irradiance_.rows(face));
-        if (proxy_.faces()[face].solid || count < kMinFaceCells) continue;
+        const auto cells = cell_irradiance_.texelsOf(face);
+        if (proxy_.faces()[face].solid || cells.size() < kMinFaceCells) continue;
         for (int c = 0; c < 3; ++c) {
             // The face's reflectance, from the cells that no box makes doubtful.
             const auto usable = [&](std::size_t i) {
@@ -186,7 +184,7 @@ void RoomLight::scaleDoubtfulIrradiance()
             };
             double weights = 0.0;
             double log_reflectance = 0.0;
-            for (std::size_t i = begin; i < begin + count; ++i) {
+            for (const std::size_t i : cells) {
                 if (!usable(i)) continue;
                 const double doubt = (cell_doubt_[i].higher[c] - cell_doubt_[i].lower[c]) /
                                      (kLittleDoubt * cell_irradiance_[i][c]);
@@ -195,9 +193,9 @@ void RoomLight::scaleDoubtfulIrradiance()
                 log_reflectance +=
                     weight * std::log(pi * cell_radiance_[i][c] / cell_irradiance_[i][c]);
             }
-            if (weights < 0.2 * static_cast<double>(count)) continue;
+            if (weights < 0.2 * static_cast<double>(cells.size())) continue;
             const double reflectance = std::exp(log_reflectance / weights);
-            for (std::size_t i = begin; i < begin + count; ++i) {
+            for (const std::size_t i : cells) {
                 if (!usable(i)) continue;
                 const double irradiance = cell_irradiance_[i][c];
                 const double wanted = pi * cell_radiance_[i][c] / reflectance;
@@ -219,36 +217,28 @@ void RoomLight::fillUnseen()
         // Mean reflectance of what was seen of this face.
         glm::dvec3 reflectance(0.0);
         double seen_count = 0.0;
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
         const auto seen = [&](std::size_t i) { return probe_saw_[i] || photo_saw_[i]; };
-        const auto uvOf = [&](std::size_t i) {
-            return radiance_.uv(radiance_.texel(i), glm::dvec2(0.5));
-        };
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
+        for (const std::size_t i : radiance_.texelsOf(face)) {
             if (!radiance_.valid(i) || !seen(i)) continue;
-            reflectance +=
-                glm::dvec3(cell_reflectance_.lookUp(face, uvOf(i), Rgb(kUnseenReflectance)));
+            reflectance += glm::dvec3(
+                cell_reflectance_.lookUp(face, radiance_.centerUv(i), Rgb(kUnseenReflectance)));
             seen_count += 1.0;
         }
         const Rgb mean = seen_count > 0.0 ? Rgb(reflectance / seen_count) : Rgb(kUnseenReflectance);
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i)
+        for (const std::size_t i : radiance_.texelsOf(face))
             if (radiance_.valid(i) && !seen(i))
-                radiance_[i] = mean * cell_irradiance_.lookUp(face, uvOf(i), Rgb(0.0f)) /
+                radiance_[i] = mean *
+                               cell_irradiance_.lookUp(face, radiance_.centerUv(i), Rgb(0.0f)) /
                                static_cast<float>(pi);
     }
 }
 
-void RoomLight::reportCoverage()
+void RoomLight::reportCoverage(glm::dvec3 reference)
 {
     double unseen = 0.0;
     double total = 0.0;
     for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
-        const std::size_t end =
-            radiance_.firstOf(face) +
-            static_cast<std::size_t>(radiance_.columns(face) * radiance_.rows(face));
-        for (std::size_t i = radiance_.firstOf(face); i < end; ++i) {
+        for (const std::size_t i : radiance_.texelsOf(face)) {
             if (!radiance_.valid(i)) continue;
             total += texelArea(face);
             if (!probe_saw_[i] && !photo_saw_[i]) unseen += texelArea(face);
@@ -263,19 +253,16 @@ void RoomLight::reportCoverage()
                  "photograph; their radiance is gathered light times the mean reflectance",
                  100.0 * unseen / total)});
 
-    // The share of the light through openings, at the middle of the room, that nobody saw.
+    // The share of the light through openings, where the objects stand, that nobody saw.
     if (portal_triangles_.empty() || !outside_table_) return;
     double extended = 0.0;
     double through = 0.0;
     const Image<Rgb>& far = outside_.pixels;
-    glm::dvec3 middle(0.0);
-    for (const ProxyFace& face : proxy_.faces())
-        middle += (face.corner + 0.5 * (face.edge_u + face.edge_v)) / double(proxy_.faces().size());
     for (int y = 0; y < far.height(); ++y) {
         const double solid_angle = environmentTexelSolidAngle(far.width(), far.height(), y);
         for (int x = 0; x < far.width(); ++x) {
             const auto hit = proxy_.intersect(
-                middle,
+                reference,
                 environmentDirectionFromUv({(x + 0.5) / far.width(), (y + 0.5) / far.height()}));
             if (!hit || !hit->opening) continue;
             const double power = luminance(far(x, y)) * solid_angle;
@@ -287,10 +274,9 @@ void RoomLight::reportCoverage()
         findings_.push_back(
             {Severity::Info,
              "light-opening-extended",
-             fmt::format(
-                 "{:.1f} % of the light through the openings (at the middle of the room) is "
-                 "taken from the nearest direction that the probe saw through them",
-                 100.0 * extended / through)});
+             fmt::format("{:.1f} % of the light through the openings (at the objects) is "
+                         "taken from the nearest direction that the probe saw through them",
+                         100.0 * extended / through)});
 }
 
 }  // namespace insitu

@@ -3,6 +3,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <vector>
@@ -225,6 +226,12 @@ Findings InsertionOptions::validate() const
            "min_samples must be in [1, max_samples]");
     demand(target_error >= 0.0, "target_error must be >= 0");
     demand(max_seconds >= 0.0, "max_seconds must be >= 0");
+    demand(path.max_bounces >= 1, "path.max_bounces must be >= 1");
+    demand(path.roulette_start >= 0, "path.roulette_start must be >= 0");
+    demand(interreflection.rounds >= 0, "interreflection.rounds must be >= 0");
+    demand(interreflection.samples_per_cell > 0, "interreflection.samples_per_cell must be > 0");
+    demand(filter.levels >= 0 && filter.levels <= 10, "filter.levels must be in [0, 10]");
+    demand(filter.range_sigmas > 0.0, "filter.range_sigmas must be > 0");
     return findings;
 }
 
@@ -234,6 +241,7 @@ InsertionResult renderInsertion(const Camera& camera,
                                 const InsertionOptions& options,
                                 Progress& progress)
 {
+    requireValid(options.validate(), "render options");
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
     const auto outOfTime = [&] {
@@ -243,12 +251,13 @@ InsertionResult renderInsertion(const Camera& camera,
     const RoomWithObjects scene(room, objects, options.interreflection, progress);
     const PixelSampler sampler(camera, scene, options);
 
-    // All pixels take their fewest samples, then those that are still noisy go on, pass by pass:
-    // a time limit then stops with an even picture.
+    // All pixels take their fewest samples, whatever the time limit; then those that are still
+    // noisy go on, pass by pass, until they are done or time is up.
     const int width = camera.width;
     const int height = camera.height;
     std::vector<PixelSums> sums(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     InsertionResult result;
+    std::atomic<bool> cut_short = false;
     int reached = 0;
     while (reached < options.max_samples) {
         const int goal = std::min(
@@ -257,7 +266,8 @@ InsertionResult renderInsertion(const Camera& camera,
         const Image<std::uint8_t> active =
             noisyPixels(sums, width, height, reached == 0 ? -1.0 : options.target_error);
         parallelFor(0, height, [&](std::int64_t y) {
-            if (progress.cancelled()) return;
+            if (reached > 0 && outOfTime()) cut_short = true;
+            if (progress.cancelled() || cut_short) return;
             for (int x = 0; x < width; ++x) {
                 if (!active(x, static_cast<int>(y))) continue;
                 PixelSums& pixel = sums[static_cast<std::size_t>(y * width + x)];
@@ -266,12 +276,10 @@ InsertionResult renderInsertion(const Camera& camera,
             }
         });
         progress.checkpoint();
+        result.stopped_by_time = cut_short || (outOfTime() && goal < options.max_samples);
         reached = goal;
         progress.report("render", static_cast<double>(reached) / options.max_samples);
-        if (outOfTime()) {
-            result.stopped_by_time = reached < options.max_samples;
-            break;
-        }
+        if (result.stopped_by_time) break;
     }
 
     result.layers = emptyLayers(width, height);

@@ -108,13 +108,7 @@ Findings ReinhardOptions::validate() const
 
 std::unique_ptr<ToneMapOperator> makeReinhard(const ReinhardOptions& options)
 {
-    const Findings problems = options.validate();
-    if (!problems.empty()) {
-        std::string cause;
-        for (const Finding& problem : problems)
-            cause += (cause.empty() ? "" : "; ") + problem.message;
-        throw InputError("tone mapping", cause);
-    }
+    requireValid(options.validate(), "tone mapping");
     return std::make_unique<Reinhard>(options);
 }
 

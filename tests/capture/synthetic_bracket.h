@@ -4,7 +4,7 @@
 #include "core/random.h"
 #include "core/response_curve.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -207,5 +207,75 @@ TEST(RoomLight, PhotographStandsInForTheProbe)
               Rgb(0.0f));
 }
 
+// A blind of laths as a solid box before the window: the probe sees daylight through it, far
+// brighter than laths could reflect, so light passes; a box that looks like a wall hides.
+TEST(RoomLight, LightPassesThroughTheGapsThatTheProbeSaw)
+{
+    RoomDescription room = roomWithWindow();
+    room.boxes.push_back({{1.2, 1.0, -0.9}, {1.3, 1.9, 0.9}, true, "blind"});
+    const SceneProxy proxy(room);
+    const glm::dvec3 center(0.0, 1.5, 0.0);
+    const auto lightWith = [&](float through_blind) {
+        const EnvironmentMap probe = environmentOf(128, [&](glm::dvec3 d) {
+            const auto hit = proxy.intersect(center, d);
+            const bool blind = hit && proxy.faces()[hit->face].solid;
+            return Rgb(blind ? through_blind : 0.1f);
+        });
+        RoomLightOptions options = coarse();
+        options.fit_unseen_outside = false;
+        return RoomLight(proxy, probe, center, std::nullopt, options, g_silent);
+    };
+    const glm::dvec3 x(-1.0, 1.5, 0.0);
+    const RoomLight laths = lightWith(10.0f);
+    EXPECT_TRUE(hasFinding(laths.findings(), "light-through-gaps"));
+    const auto through = laths.intersect(x, {1, 0, 0});
+    ASSERT_TRUE(through);
+    EXPECT_TRUE(through->opening);
+    EXPECT_NEAR(through->distance_m, 3.0, 1e-9);
+    EXPECT_NEAR(laths.incident(x, {1, 0, 0}).radiance.g, 10.0f, 0.1f);
+
+    const RoomLight board = lightWith(0.1f);
+    EXPECT_FALSE(hasFinding(board.findings(), "light-through-gaps"));
+    EXPECT_FALSE(board.intersect(x, {1, 0, 0})->opening);
+}
+
+// A plate under a bright ceiling that is not there, though the project says so: the floor below
+// looks like the rest of the floor. Its irradiance is raised until its reflectance is the floor's.
+TEST(RoomLight, ABoxThatExplainsNothingDoesNotDarken)
+{
+    RoomDescription room = closedRoom();
+    room.boxes.push_back({{-0.8, 0.9, -2.0}, {0.8, 0.95, -0.4}, true, "plate"});
+    const SceneProxy proxy(room);
+    const glm::dvec3 center(0.0, 0.6, 1.0);
+    const EnvironmentMap probe = environmentOf(128, [&](glm::dvec3 d) {
+        const auto hit = proxy.intersect(center, d);
+        return Rgb(hit && hit->point.y > 2.4 ? 10.0f : 0.5f);
+    });
+    const RoomLight light(proxy, probe, center, std::nullopt, coarse(), g_silent);
+    const auto below = proxy.intersect({0.0, 0.5, -1.2}, {0, -1, 0});
+    const auto beside = proxy.intersect({0.0, 0.5, 1.2}, {0, -1, 0});
+    ASSERT_TRUE(below && beside && below->face == beside->face);
+
+    const auto at = [&](const ProxyHit& hit) { return light.irradianceScale(hit.face, hit.uv).g; };
+    EXPECT_GT(at(*below), 1.5f);
+    EXPECT_NEAR(at(*beside), 1.0f, 0.15f);
+    const auto reflectance = [&](const ProxyHit& hit) {
+        return light.cellReflectance().lookUp(hit.face, hit.uv, Rgb(0.0f)).g;
+    };
+    // The upper bound leaves out what would bounce once more: most of the way, not all of it.
+    EXPECT_LT(reflectance(*below) / reflectance(*beside), 1.3f);
+}
+
+TEST(RoomLight, OptionsWithoutMeaningAreRefused)
+{
+    const SceneProxy proxy(closedRoom());
+    const EnvironmentMap white = environmentOf(8, [](glm::dvec3) { return Rgb(1.0f); });
+    RoomLightOptions options;
+    options.texel_m = std::nan("");
+    options.rays_per_cell = 0;
+    EXPECT_EQ(options.validate().size(), 2u);
+    EXPECT_THROW(RoomLight(proxy, white, {0, 1, 0}, std::nullopt, options, g_silent), InputError);
+}
+
 }  // namespace
 }  // namespace insitu
