@@ -11,6 +11,7 @@ find_package(TinyGLTF REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(EXIF REQUIRED IMPORTED_TARGET libexif)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 if(INSITU_BUILD_TESTS)
   find_package(GTest REQUIRED)
   find_package(assimp REQUIRED)  # an independent reader to compare ours with

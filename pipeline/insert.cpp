@@ -3,6 +3,8 @@
 #include "calib/photo_calibration.h"
 #include "core/color.h"
 #include "core/io/image_io.h"
+#include "pipeline/stage_cache.h"
+#include "pipeline/stage_parts.h"
 
 #include <algorithm>
 #include <chrono>
@@ -16,10 +18,10 @@ namespace {
 class Stopwatch {
 public:
     explicit Stopwatch(std::vector<StageTime>& times) : times_(times) {}
-    void lap(const char* stage)
+    void lap(const char* stage, bool from_cache = false)
     {
         const auto now = std::chrono::steady_clock::now();
-        times_.push_back({stage, std::chrono::duration<double>(now - last_).count()});
+        times_.push_back({stage, std::chrono::duration<double>(now - last_).count(), from_cache});
         last_ = now;
     }
 
@@ -135,7 +137,7 @@ void matchLightToPhoto(const Image<Rgb>& photo, bool unit_known, InsertResult& r
 }
 
 /// Objects into the world; what looks like a wrong scale or place is a finding.
-ObjectScene placeObjects(const Project& project, InsertResult& result)
+std::vector<ObjectScene::Object> placeObjects(const Project& project, InsertResult& result)
 {
     std::vector<ObjectScene::Object> objects;
     for (const ProjectObject& wanted : project.objects) {
@@ -155,7 +157,34 @@ ObjectScene placeObjects(const Project& project, InsertResult& result)
         }
         objects.push_back(std::move(object));
     }
-    return ObjectScene(std::move(objects));
+    return objects;
+}
+
+/// captureLight, or what an earlier run made of the same files and numbers.
+CapturedLight cachedLight(const Project& project,
+                          const SceneProxy& proxy,
+                          const Camera& camera,
+                          const InsertOptions& options,
+                          StageCache& cache,
+                          bool& from_cache)
+{
+    // A file with an environment is read as quickly as the cache.
+    if (!project.light.probe) return captureLight(project, proxy, camera, options);
+    const ProjectProbe& probe = *project.light.probe;
+    ContentKey key("probe");
+    key.add(probe.kind, probe.ball, probe.center_m, probe.view_position_m, probe.crop_origin_px);
+    for (const ProjectImage& image : probe.images)
+        key.add(image.path.filename().string(), image.exposure).addFile(image.path);
+    if (probe.response) key.add(probe.response->filename().string()).addFile(*probe.response);
+    if (!probe.view_position_m) key.add(camera);
+    key.add(proxy.faces(), proxy.openings(), options.response, options.merge);
+    if (auto kept = cache.find<CapturedLight>(key)) {
+        from_cache = true;
+        return *std::move(kept);
+    }
+    CapturedLight light = captureLight(project, proxy, camera, options);
+    cache.keep(key, light);
+    return light;
 }
 
 glm::dvec3 objectsCenter(const ObjectScene& objects)
@@ -165,6 +194,45 @@ glm::dvec3 objectsCenter(const ObjectScene& objects)
         sum += 0.5 * (box.min + box.max);
     return sum / std::max<double>(1.0, static_cast<double>(objects.bounds().size()));
 }
+
+/// Room light and render: what takes the time, and is kept whole.
+struct RenderStage {
+    const Camera& camera;
+    const SceneProxy& proxy;
+    const CapturedLight& light;
+    const std::optional<PhotographedRadiance>& photographed;
+    const InsertOptions& options;
+
+    [[nodiscard]] RenderedStage run(std::vector<ObjectScene::Object> objects,
+                                    StageCache& cache,
+                                    Stopwatch& watch,
+                                    Progress& progress) const
+    {
+        ContentKey key("render");
+        key.add(camera, proxy.faces(), proxy.openings(), light.environment, light.center_m);
+        key.add(options.light, options.render);
+        if (photographed) key.add(photographed->camera, photographed->radiance);
+        for (const ObjectScene::Object& object : objects)
+            key.add(object.model);
+        if (auto kept = cache.find<RenderedStage>(key)) {
+            watch.lap("render", /*from_cache=*/true);
+            return *std::move(kept);
+        }
+
+        const ObjectScene scene(std::move(objects));
+        RoomLightOptions light_options = options.light;
+        light_options.reference_point_m = objectsCenter(scene);
+        const RoomLight room(
+            proxy, light.environment, light.center_m, photographed, light_options, progress);
+        watch.lap("room light");
+        RenderedStage rendered{room.findings(),
+                               renderInsertion(camera, room, scene, options.render, progress)};
+        // What a time limit cut short is as good as this run was fast.
+        if (!rendered.render.stopped_by_time) cache.keep(key, rendered);
+        watch.lap("render");
+        return rendered;
+    }
+};
 
 }  // namespace
 
@@ -206,35 +274,28 @@ InsertResult insertObjects(const Project& project, const InsertOptions& options,
     const Camera& camera = result.camera.camera;
     watch.lap("camera");
 
-    const ObjectScene objects = placeObjects(project, result);
+    std::vector<ObjectScene::Object> objects = placeObjects(project, result);
     watch.lap("models");
 
+    StageCache cache(options.cache_folder);
     const SceneProxy proxy(project.room);
     append(result.findings, proxy.findings());
-    result.light = captureLight(project, proxy, camera, options);
+    bool from_cache = false;
+    result.light = cachedLight(project, proxy, camera, options, cache, from_cache);
     append(result.findings, result.light.findings);
     choosePhotoResponse(project, result);
-    watch.lap("probe");
+    watch.lap("probe", from_cache);
 
     // The photograph stands in for surfaces the probe did not see, where both share a unit.
     const Image<Rgb> photo_radiance = photographedRadiance(
         result.photo.image, result.photo_response, result.photo_relative_exposure);
     std::optional<PhotographedRadiance> photographed;
     if (result.light.radiance_unit_known) photographed = {camera, photo_radiance};
-    RoomLightOptions light_options = options.light;
-    light_options.reference_point_m = objectsCenter(objects);
-    const RoomLight room(proxy,
-                         result.light.environment,
-                         result.light.center_m,
-                         photographed,
-                         light_options,
-                         progress);
-    append(result.findings, room.findings());
-    watch.lap("room light");
-
-    result.render = renderInsertion(camera, room, objects, options.render, progress);
+    RenderStage stage{camera, proxy, result.light, photographed, options};
+    RenderedStage rendered = stage.run(std::move(objects), cache, watch, progress);
+    append(result.findings, std::move(rendered.light_findings));
+    result.render = std::move(rendered.render);
     matchLightToPhoto(photo_radiance, result.light.radiance_unit_known, result);
-    watch.lap("render");
 
     result.composite = compositeDifferential(result.photo.image,
                                              result.photo_response,
@@ -242,6 +303,7 @@ InsertResult insertObjects(const Project& project, const InsertOptions& options,
                                              result.render.layers,
                                              options.composite);
     append(result.findings, result.composite.findings);
+    append(result.findings, cache.findings());
     watch.lap("composite");
     return result;
 }

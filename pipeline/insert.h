@@ -8,6 +8,7 @@
 #include "pipeline/project.h"
 #include "render/renderer.h"
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -21,12 +22,15 @@ struct InsertOptions {
     CompositeOptions composite;
     /// Take the focal length in EXIF into account.
     bool use_exif_focal = true;
+    /// Where the results of stages are kept for the next run (stage_cache.h); empty: nowhere.
+    std::filesystem::path cache_folder;
 };
 
 /// Seconds one stage took.
 struct StageTime {
     std::string stage;
     double seconds = 0.0;
+    bool from_cache = false;
 };
 
 /// The light of a project: an environment seen from a place in the room.

@@ -55,8 +55,11 @@ void writeReport(const std::filesystem::path& path,
                  const std::filesystem::path& picture)
 {
     Json times = Json::object();
-    for (const StageTime& time : result.times)
+    Json cached = Json::array();
+    for (const StageTime& time : result.times) {
         times[time.stage] = time.seconds;
+        if (time.from_cache) cached.push_back(time.stage);
+    }
     const Json report = {
         {"format", "insitu-report"},
         {"version", 1},
@@ -85,7 +88,8 @@ void writeReport(const std::filesystem::path& path,
           {"influence_codes", options.composite.influence_codes},
           {"influence_fraction", result.composite.influence_fraction}}},
         {"findings", findingsJson(result.findings)},
-        {"seconds", times}};
+        {"seconds", times},
+        {"from_cache", cached}};
     writeJson(path, report);
 }
 

@@ -1,6 +1,7 @@
 #include "apps/cli/command.h"
 #include "core/io/image_io.h"
 #include "pipeline/report.h"
+#include "pipeline/stage_cache.h"
 
 namespace insitu::cli {
 
@@ -15,6 +16,7 @@ struct InsertArguments {
     std::string technique = "reference";
     std::string form = "ratio";
     bool ignore_exif_focal = false;
+    bool no_cache = false;
     int bits = 0;
     InsertOptions options;
 };
@@ -33,6 +35,11 @@ void runInsert(InsertArguments& arguments, Context& context)
     options.composite.form =
         arguments.form == "ratio" ? CompositeForm::Ratio : CompositeForm::Difference;
     options.use_exif_focal = !arguments.ignore_exif_focal;
+
+    if (arguments.no_cache)
+        options.cache_folder.clear();
+    else if (options.cache_folder.empty())
+        options.cache_folder = StageCache::userFolder().value_or("");
 
     const Project project = readProject(arguments.project);
     const InsertResult result = insertObjects(project, options, context.progress());
@@ -81,6 +88,11 @@ void registerInsert(CLI::App& app, Context& context)
         ->capture_default_str();
     command->add_flag(
         "--ignore-exif-focal", arguments->ignore_exif_focal, "Calibrate from the lines alone");
+    command->add_option("--cache",
+                        arguments->options.cache_folder,
+                        "Folder in which the results of stages are kept for the next run "
+                        "(default: $INSITU_CACHE, or insitu/ in the user's cache folder)");
+    command->add_flag("--no-cache", arguments->no_cache, "Neither use nor keep results of stages");
     context.addCommonOptions(*command);
     command->footer(
         "Examples:\n"

@@ -23,6 +23,12 @@ Json readJsonFile(const fs::path& path)
     return Json::parse(stream);
 }
 
+std::string bytesOf(const fs::path& path)
+{
+    std::ifstream stream(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
 /// The shipped sample, with its paths made absolute and one thing changed.
 class InsertProject : public ::testing::Test {
 protected:
@@ -78,6 +84,27 @@ TEST_F(InsertProject, WritesPictureReportLayersAndRefusesToOverwrite)
     const ProgramRun again = insert();
     EXPECT_EQ(again.exit_code, 1);
     EXPECT_THAT(again.messages, HasSubstr("--force"));
+}
+
+TEST_F(InsertProject, ASecondRunFindsTheStagesOfTheFirst)
+{
+    const fs::path report = folder_ / "report.json";
+    const std::vector<std::string> more = {
+        "--cache", (folder_ / "cache").string(), "--report", report.string(), "--force"};
+    ASSERT_EQ(insert(more).exit_code, 0);
+    EXPECT_EQ(readJsonFile(report)["from_cache"], Json::array());
+    const fs::path first = folder_ / "first.png";
+    fs::rename(picture(), first);
+
+    ASSERT_EQ(insert(more).exit_code, 0);
+    EXPECT_EQ(readJsonFile(report)["from_cache"], Json({"probe", "render"}));
+    EXPECT_EQ(bytesOf(picture()), bytesOf(first));
+
+    // Another place for the object: the light is the same, the picture is not.
+    project_["objects"][0]["rotation_y_deg"] = 12.0;
+    ASSERT_EQ(insert(more).exit_code, 0);
+    EXPECT_EQ(readJsonFile(report)["from_cache"], Json({"probe"}));
+    EXPECT_NE(bytesOf(picture()), bytesOf(first));
 }
 
 TEST_F(InsertProject, ABadProjectEndsWithItsPlaceCauseAndExitCode)

@@ -19,11 +19,13 @@ struct ProgramRun {
     std::string messages;  ///< stderr
 };
 
-/// Runs the program under test (INSITU_PROGRAM) with these arguments and no terminal.
+/// Runs the program under test (INSITU_PROGRAM) with these arguments, no terminal and an empty
+/// cache.
 inline ProgramRun runProgram(const std::vector<std::string>& arguments)
 {
     const TemporaryFolder scratch;
-    std::string command = "'" INSITU_PROGRAM "'";
+    std::string command =
+        "INSITU_CACHE='" + (scratch / "cache").string() + "' '" INSITU_PROGRAM "'";
     for (const std::string& argument : arguments)
         command += " '" + argument + "'";
     command += " >'" + (scratch / "out").string() + "' 2>'" + (scratch / "err").string() + "'";

@@ -4,6 +4,7 @@
 #include "core/io/json.h"
 #include "pipeline/project_keys.h"
 #include "tests/support/data.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -28,11 +29,6 @@ class ProjectFile : public ::testing::Test {
 protected:
     void SetUp() override
     {
-        const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = fs::path(INSITU_BINARY_DIR) / "test-artifacts" /
-                  (std::string("project.") + test->name());
-        fs::remove_all(folder_);
-        fs::create_directories(folder_);
         for (const char* name : {"plate.jpg",
                                  "lines.json",
                                  "camera.json",
@@ -43,8 +39,6 @@ protected:
             write(name, "x");
         write("chair.obj", "v 0 0 0\nv 2 0 0\nv 0 4 0\nv 0 0 6\nf 1 2 3\nf 1 3 4\n");
     }
-    void TearDown() override { fs::remove_all(folder_); }
-
     void write(const std::string& name, const std::string& text) const
     {
         std::ofstream(folder_ / name) << text;
@@ -86,7 +80,7 @@ protected:
         return "";
     }
 
-    fs::path folder_;
+    TemporaryFolder folder_;
 };
 
 TEST_F(ProjectFile, GoodFileIsReadWhole)

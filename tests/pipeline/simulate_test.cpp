@@ -7,6 +7,7 @@
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "core/parallel.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -31,22 +32,13 @@ class SimulateRoom : public ::testing::Test {
 protected:
     void SetUp() override
     {
-        const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = fs::path(INSITU_BINARY_DIR) / "test-artifacts" /
-                  (std::string("simulate.") + test->name());
-        fs::remove_all(folder_);
-        fs::create_directories(folder_);
         std::ofstream(folder_ / "tent.obj")
             << "v -50 0 -50\nv 50 0 -50\nv 50 0 50\nv -50 0 50\nv 0 80 0\n"
                "f 1 2 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
         Image<Rgb> sky(16, 8, Rgb(0.5f, 0.7f, 1.0f));
         writeRadiance(folder_ / "sky.exr", sky);
     }
-    void TearDown() override
-    {
-        fs::remove_all(folder_);
-        setThreadCount(0);
-    }
+    void TearDown() override { setThreadCount(0); }
 
     [[nodiscard]] static Json good()
     {
@@ -99,7 +91,7 @@ protected:
         return "";
     }
 
-    fs::path folder_;
+    TemporaryFolder folder_;
     Progress silent_;
 };
 

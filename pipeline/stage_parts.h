@@ -1,0 +1,129 @@
+#pragma once
+
+#include "pipeline/insert.h"
+#include "pipeline/value_archive.h"
+
+// The parts of every value that a cached stage is made from or gives, each listed once: what is
+// missing here is missed in keys and in what is read back. The sizes stand guard: who adds a member
+// is led here.
+
+namespace insitu {
+
+/// What the stages room light and render give together.
+struct RenderedStage {
+    Findings light_findings;
+    InsertionResult render;
+};
+
+void parts(auto& archive, PartsOf<Finding> auto& v)
+{
+    archive(v.severity, v.code, v.message);
+}
+void parts(auto& archive, PartsOf<Exposure> auto& v)
+{
+    archive(v.seconds, v.f_number, v.iso);
+}
+void parts(auto& archive, PartsOf<PhotoMetadata> auto& v)
+{
+    archive(v.exposure, v.focal_mm, v.focal_35mm, v.focal_px, v.make, v.model, v.orientation);
+    archive(v.has_icc_profile, v.exif);
+}
+void parts(auto& archive, PartsOf<ResponseCurve> auto& v)
+{
+    archive(v.exposure, v.source);
+}
+void parts(auto& archive, PartsOf<EnvironmentMap> auto& v)
+{
+    archive(v.pixels);
+}
+void parts(auto& archive, PartsOf<CapturedLight> auto& v)
+{
+    archive(v.environment, v.center_m, v.response, v.response_known, v.radiance_unit_known);
+    archive(v.metadata, v.findings);
+}
+void parts(auto& archive, PartsOf<RenderLayers> auto& v)
+{
+    archive(v.object, v.alpha, v.irradiance_without, v.irradiance_with, v.depth_m);
+    archive(v.object_variance, v.ratio_variance, v.probe_radiance);
+}
+void parts(auto& archive, PartsOf<InsertionResult> auto& v)
+{
+    archive(v.layers, v.mean_samples, v.stopped_by_time, v.ratio_error);
+}
+void parts(auto& archive, PartsOf<RenderedStage> auto& v)
+{
+    archive(v.light_findings, v.render);
+}
+
+void parts(auto& archive, PartsOf<Camera> auto& v)
+{
+    archive(v.width, v.height, v.focal_px, v.principal_px, v.position_m, v.right, v.up, v.forward);
+}
+void parts(auto& archive, PartsOf<ProxyFace> auto& v)
+{
+    archive(v.corner, v.edge_u, v.edge_v, v.normal, v.triangle, v.two_sided, v.solid, v.name);
+    archive(v.openings);
+}
+void parts(auto& archive, PartsOf<RoomOpening> auto& v)
+{
+    archive(v.corners_m);
+}
+void parts(auto& archive, PartsOf<MirrorBall> auto& v)
+{
+    archive(v.center_px, v.radius_px, v.radius_m, v.reflectance, v.center_m);
+}
+void parts(auto& archive, PartsOf<TriangleMesh> auto& v)
+{
+    archive(v.positions, v.normals, v.texcoords, v.triangles, v.material_of);
+}
+void parts(auto& archive, PartsOf<Material> auto& v)
+{
+    archive(v.name, v.base_color, v.alpha, v.metallic, v.roughness, v.specular, v.emissive);
+    archive(v.alpha_mask, v.alpha_cutoff, v.double_sided, v.base_color_texture);
+    archive(v.metallic_roughness_texture, v.emissive_texture);
+}
+void parts(auto& archive, PartsOf<Texture> auto& v)
+{
+    archive(v.texels, v.srgb, v.clamp_s, v.clamp_t);
+}
+void parts(auto& archive, PartsOf<Model> auto& v)
+{
+    archive(v.mesh, v.materials, v.textures, v.findings);
+}
+
+void parts(auto& archive, PartsOf<ResponseOptions> auto& v)
+{
+    archive(v.samples, v.smoothness);
+}
+void parts(auto& archive, PartsOf<MergeOptions> auto& v)
+{
+    archive(v.clip_fraction, v.black_fraction);
+}
+void parts(auto& archive, PartsOf<RoomLightOptions> auto& v)
+{
+    archive(v.texel_m, v.cell_m, v.rays_per_cell, v.fit_unseen_outside, v.reference_point_m);
+    archive(v.seed);
+}
+void parts(auto& archive, PartsOf<PathOptions> auto& v)
+{
+    archive(v.max_bounces, v.roulette_start);
+}
+void parts(auto& archive, PartsOf<InterreflectionOptions> auto& v)
+{
+    archive(v.rounds, v.samples_per_cell, v.seed, v.path);
+}
+void parts(auto& archive, PartsOf<IrradianceFilterOptions> auto& v)
+{
+    archive(v.levels, v.range_sigmas);
+}
+void parts(auto& archive, PartsOf<InsertionOptions> auto& v)
+{
+    archive(v.technique, v.max_samples, v.min_samples, v.target_error, v.max_seconds, v.seed);
+    archive(v.path, v.interreflection, v.filter);
+}
+static_assert(sizeof(ResponseOptions) == 16 && sizeof(MergeOptions) == 16);
+static_assert(sizeof(RoomLightOptions) == 56 && sizeof(PathOptions) == 8);
+static_assert(sizeof(InterreflectionOptions) == 24 && sizeof(IrradianceFilterOptions) == 16);
+static_assert(sizeof(InsertionOptions) == 88);
+
+}  // namespace insitu

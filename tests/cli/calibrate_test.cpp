@@ -1,0 +1,87 @@
+#include "tests/cli/run_program.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <string>
+
+namespace insitu {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using ::testing::HasSubstr;
+
+const fs::path kSample = fs::path(INSITU_SOURCE_DIR) / "samples" / "simulated-room";
+
+Json readJsonFile(const fs::path& path)
+{
+    std::ifstream stream(path);
+    return Json::parse(stream);
+}
+
+/// The shipped sample's photograph and lines, the lines with one thing changed.
+class CalibrateSample : public ::testing::Test {
+protected:
+    void SetUp() override { lines_ = readJsonFile(kSample / "lines.json"); }
+
+    [[nodiscard]] ProgramRun calibrate() const
+    {
+        const fs::path file = folder_.add("lines.json", lines_.dump());
+        return runProgram({"calibrate",
+                           (kSample / "plate.jpg").string(),
+                           "--lines",
+                           file.string(),
+                           "-o",
+                           camera().string()});
+    }
+    [[nodiscard]] fs::path camera() const { return folder_ / "camera.json"; }
+
+    TemporaryFolder folder_;
+    Json lines_;
+};
+
+TEST_F(CalibrateSample, WritesTheCameraThatTookThePicture)
+{
+    const ProgramRun run = calibrate();
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    const Json found = readJsonFile(camera());
+    const Json truth = readJsonFile(kSample / "truth" / "truth.json");
+    const double focal = truth["camera"]["fx_px"].get<double>();
+    // docs/validation.md: 0.2 to 0.5 % on rooms like this.
+    EXPECT_NEAR(found["focal_px"][0].get<double>() / focal, 1.0, 0.01);
+    EXPECT_GT(found["focal_px_sigma"].get<double>(), 0.0);
+
+    const ProgramRun again = calibrate();
+    EXPECT_EQ(again.exit_code, 1);
+    EXPECT_THAT(again.messages, HasSubstr("--force"));
+}
+
+TEST_F(CalibrateSample, ASingleAxisIsNoAnswer)
+{
+    Json kept = Json::array();
+    for (const Json& segment : lines_["segments"])
+        if (segment["axis"] == "x") kept.push_back(segment);
+    lines_["segments"] = kept;
+    const ProgramRun run = calibrate();
+    EXPECT_EQ(run.exit_code, 3) << run.messages;
+    EXPECT_FALSE(fs::exists(camera()));
+}
+
+TEST_F(CalibrateSample, BadLinesEndWithTheirPlaceAndCause)
+{
+    const Json good = lines_;
+    lines_["segments"][0]["axes"] = "x";
+    EXPECT_THAT(calibrate().messages, HasSubstr("axis"));
+    lines_ = good;
+    lines_["image"]["width"] = 64;
+    const ProgramRun run = calibrate();
+    EXPECT_EQ(run.exit_code, 1);
+    EXPECT_THAT(run.messages, HasSubstr("lines.json"));
+    EXPECT_FALSE(fs::exists(camera()));
+}
+
+}  // namespace
+}  // namespace insitu
