@@ -61,7 +61,10 @@ RoomLight::RoomLight(const SceneProxy& proxy,
 {
     findGaps(probe, probe_center_m);
     bakeProbe(probe, probe_center_m, progress);
-    if (photograph) fillFromPhotograph(*photograph);
+    if (photograph) {
+        fillFromPhotograph(*photograph);
+        lookThroughBoxes(*photograph);
+    }
     extendBeyondOpenings(probe, probe_center_m);
     buildTables(options.reference_point_m);
 

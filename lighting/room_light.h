@@ -96,6 +96,12 @@ public:
     /// the irradiance may be anything between the box as given and no box at all, and the value is
     /// chosen that leaves the surface the reflectance of the rest of its face. 1 elsewhere.
     [[nodiscard]] Rgb irradianceScale(std::size_t face, glm::dvec2 uv) const;
+    /// True when the photograph shows, through a solid box, what stands behind it
+    /// (see_through.h); false everywhere without a photograph.
+    [[nodiscard]] bool seesThrough(int x, int y) const
+    {
+        return !see_through_.empty() && see_through_(x, y) != 0;
+    }
     /// Irradiance and Lambert reflectance of the surfaces, on the cell grid.
     [[nodiscard]] const FaceGrid<Rgb>& cellIrradiance() const { return cell_irradiance_; }
     [[nodiscard]] const FaceGrid<Rgb>& cellReflectance() const { return cell_reflectance_; }
@@ -105,6 +111,7 @@ private:
     void findGaps(const EnvironmentMap& probe, glm::dvec3 center);
     void bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progress& progress);
     void fillFromPhotograph(const PhotographedRadiance& photograph);
+    void lookThroughBoxes(const PhotographedRadiance& photograph);
     void extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 center);
     void buildTables(glm::dvec3 reference);
     void gatherCells(const RoomLightOptions& options, Progress& progress);
@@ -147,6 +154,7 @@ private:
     std::vector<Rgb> cell_radiance_;
     std::vector<Doubt> cell_doubt_;
     FaceGrid<Rgb> irradiance_scale_;
+    Image<std::uint8_t> see_through_;  ///< per pixel of the photograph
 
     /// The three ways to draw light: a texel by its power, a point in an opening, a far direction.
     std::optional<AliasTable> texel_table_;

@@ -1,6 +1,7 @@
 #include "core/color.h"
 #include "core/parallel.h"
 #include "lighting/room_light.h"
+#include "lighting/see_through.h"
 
 #include <algorithm>
 #include <cmath>
@@ -45,9 +46,7 @@ void RoomLight::findGaps(const EnvironmentMap& probe, glm::dvec3 center)
                 luminance(lookUp(probe, direction)) <= limit)
                 continue;
             // Leave this box and whatever solid stands behind it: is there an opening?
-            auto beyond = proxy_.intersect(point, direction);
-            while (beyond && proxy_.faces()[beyond->face].solid)
-                beyond = proxy_.intersect(beyond->point, direction);
+            const auto beyond = intersectBehindBoxes(proxy_, point, direction);
             if (!beyond || !beyond->opening) continue;
             gap_[i] = 1;
             ++count;
@@ -115,6 +114,14 @@ void RoomLight::fillFromPhotograph(const PhotographedRadiance& photograph)
             photo_saw_[i] = 1;
         }
     });
+}
+
+void RoomLight::lookThroughBoxes(const PhotographedRadiance& photograph)
+{
+    std::vector<std::uint8_t> known(radiance_.size());
+    for (std::size_t i = 0; i < known.size(); ++i)
+        known[i] = probe_saw_[i] || photo_saw_[i];
+    see_through_ = findSeeThrough(photograph.camera, photograph.radiance, proxy_, radiance_, known);
 }
 
 void RoomLight::extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 center)

@@ -4,6 +4,7 @@
 #include "lighting/opening_fit.h"
 #include "lighting/room_light.h"
 #include "lighting/sampling.h"
+#include "lighting/see_through.h"
 
 #include <algorithm>
 #include <cmath>
@@ -157,9 +158,7 @@ void RoomLight::fitUnseenOutside(const RoomLightOptions& options, Progress& prog
 
 Rgb RoomLight::radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const
 {
-    auto hit = proxy_.intersect(solid.point, direction);
-    while (hit && proxy_.faces()[hit->face].solid)
-        hit = proxy_.intersect(hit->point, direction);
+    const auto hit = intersectBehindBoxes(proxy_, solid.point, direction);
     return hit && !hit->opening ? faceRadiance(hit->face, hit->uv) : lookUp(outside_, direction);
 }
 

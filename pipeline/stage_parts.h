@@ -61,8 +61,8 @@ void parts(auto& archive, PartsOf<Camera> auto& v)
 }
 void parts(auto& archive, PartsOf<ProxyFace> auto& v)
 {
-    archive(v.corner, v.edge_u, v.edge_v, v.normal, v.triangle, v.two_sided, v.solid, v.name);
-    archive(v.openings);
+    archive(v.corner, v.edge_u, v.edge_v, v.normal, v.triangle, v.two_sided, v.solid, v.box);
+    archive(v.name, v.openings);
 }
 void parts(auto& archive, PartsOf<RoomOpening> auto& v)
 {

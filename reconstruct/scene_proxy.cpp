@@ -85,11 +85,14 @@ std::vector<ProxyFace> collectFaces(const RoomDescription& room)
     }
     for (const RoomPlane& plane : room.planes)
         faces.push_back(makeFace(plane.corner_m, plane.edge_u_m, plane.edge_v_m, "plane", true));
-    for (const RoomBox& box : room.boxes)
+    for (std::size_t index = 0; index < room.boxes.size(); ++index) {
+        const RoomBox& box = room.boxes[index];
         for (ProxyFace& face : boxFaces(box)) {
             face.solid = box.solid;
+            face.box = static_cast<int>(index);
             if (!box.solid || !restsOnRoom(face, room)) faces.push_back(std::move(face));
         }
+    }
     for (const RoomMesh& mesh : room.meshes) {
         for (const glm::uvec3& t : mesh.mesh.triangles) {
             const glm::dvec3 a(mesh.mesh.positions[t.x]);

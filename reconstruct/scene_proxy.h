@@ -53,6 +53,7 @@ struct ProxyFace {
     bool triangle = false;
     bool two_sided = false;
     bool solid = false;  ///< of a solid box: a stand-in for furniture, which may have gaps
+    int box = -1;        ///< index in RoomDescription::boxes, or none
     std::string name;
     std::vector<std::size_t> openings;  ///< indices of openings that are cut into this face
 };

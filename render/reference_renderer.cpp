@@ -1,5 +1,6 @@
 #include "core/color.h"
 #include "core/parallel.h"
+#include "lighting/see_through.h"
 #include "render/renderer.h"
 
 #include <algorithm>
@@ -89,7 +90,10 @@ public:
         const glm::vec2 jitter = random.uniform2();
         const glm::dvec3 direction = camera_.rayDirection(
             {x + static_cast<double>(jitter.x), y + static_cast<double>(jitter.y)});
-        const auto surface = scene_.room().proxy().intersect(camera_.position_m, direction);
+        const RoomLight& room = scene_.room();
+        const auto surface = room.seesThrough(x, y)
+                                 ? intersectBehindBoxes(room.proxy(), camera_.position_m, direction)
+                                 : room.proxy().intersect(camera_.position_m, direction);
         const auto point = scene_.objects().intersect(
             camera_.position_m, direction, surface ? surface->distance_m : kInfinity);
         ++sums.count;
@@ -106,7 +110,7 @@ public:
         if (!surface || surface->opening) return;
         ReceiverSample drawn =
             scene_.sampleReceiver(surface->point, surface->normal, options_.path, random);
-        const glm::dvec3 scale(scene_.room().irradianceScale(surface->face, surface->uv));
+        const glm::dvec3 scale(room.irradianceScale(surface->face, surface->uv));
         const glm::dvec3 corrected = scale * drawn.without;
         drawn.with += corrected - drawn.without;
         drawn.without = corrected;
@@ -119,7 +123,7 @@ public:
         sums.change += change;
         sums.change_square += change * change;
         ++sums.receivers;
-        const Rgb probe = scene_.room().probeRadiance(surface->face, surface->uv);
+        const Rgb probe = room.probeRadiance(surface->face, surface->uv);
         if (probe != Rgb(0.0f)) {
             sums.probe += glm::dvec3(probe);
             ++sums.probe_count;
