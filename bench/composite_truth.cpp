@@ -2,13 +2,14 @@
 //
 //   composite_truth [--samples N] [--both] [--form ratio|difference] ROOM_FOLDER...
 //
-// A room is a folder with project.json, plate.jpg, truth.json, truth_linear.exr, plate_linear.exr
-// and object_mask.png. A residual is the RMS over a region of the averaged error in linear light,
-// divided by that of the untouched plate: 0 is perfect, 1 no better than doing nothing. Regions:
-// "object" (mask above one half, averages over 5x5 pixels), "contact" (8 pixels around it, 3x3),
-// "shadow" (what else the object changes by more than 2 %, 15x15). "far" pixels are more than 60
-// pixels from anything that it changes by 0.5 %. The line "bound" is the photograph times the
-// true ratio of each pixel: what noise and clipped pixels of the photograph leave to be had.
+// A room is a folder with project.json, plate.jpg and, perhaps in a folder truth/, truth.json,
+// truth_linear.exr, plate_linear.exr (perhaps reduced in size) and object_mask.png. A residual is
+// the RMS over a region of the averaged error in linear light, divided by that of the untouched
+// plate: 0 is perfect, 1 no better than doing nothing. Regions: "object" (mask above one half,
+// averages over 5x5 pixels), "contact" (8 pixels around it, 3x3), "shadow" (what else the object
+// changes by more than 2 %, 15x15). "far" pixels are more than 60 pixels from anything that it
+// changes by 0.5 %. The line "bound" is the photograph times the true ratio of each pixel: what
+// noise and clipped pixels of the photograph leave to be had.
 #include "core/check.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
@@ -69,10 +70,14 @@ struct Truth {
     Vec3Image with;     ///< exposure of the plate's camera with the object, not clipped
     Vec3Image without;  ///< and without
     InverseCurve inverse;
+    int reduction = 1;  ///< how many pixels of the photograph one of these images' is wide
     MaskImage object{};
     MaskImage contact{};
     MaskImage shadow{};
-    MaskImage far{};
+    MaskImage far{};  ///< in the photograph's size
+
+    /// A window's side in pixels of the photograph, in those of the reduced pictures: odd.
+    [[nodiscard]] int side(int pixels) const { return pixels / reduction / 2 * 2 + 1; }
 };
 
 struct Score {
@@ -136,16 +141,25 @@ Vec3Image linearised(const Vec3Image& codes, const InverseCurve& inverse)
 }
 
 /// Share by which the object changes the light around a pixel.
-cv::Mat_<double> influence(const Vec3Image& with, const Vec3Image& without)
+cv::Mat_<double> influence(const Vec3Image& with, const Vec3Image& without, int side)
 {
-    const Vec3Image a = blurred(with, 21);
-    const Vec3Image b = blurred(without, 21);
+    const Vec3Image a = blurred(with, side);
+    const Vec3Image b = blurred(without, side);
     cv::Mat_<double> out(a.size());
     out.forEach([&](double& share, const int* at) {
         const cv::Vec3d level = b(at[0], at[1]);
         const double change = cv::norm(a(at[0], at[1]) - level, cv::NORM_L1) / 3.0;
         share = change / std::max(cv::sum(level)[0] / 3.0, 1e-3);
     });
+    return out;
+}
+
+/// Area averages over squares of `factor` pixels.
+template <class Mat>
+Mat reduced(const Mat& image, int factor)
+{
+    Mat out;
+    cv::resize(image, out, {image.cols / factor, image.rows / factor}, 0.0, 0.0, cv::INTER_AREA);
     return out;
 }
 
@@ -160,16 +174,22 @@ Truth readTruth(const std::filesystem::path& folder)
     Truth truth{.with = toMat(readRadiance(folder / "truth_linear.exr").pixels, scale),
                 .without = toMat(readRadiance(folder / "plate_linear.exr").pixels, scale),
                 .inverse = InverseCurve(response.at("curve"))};
-    const MaskImage mask = cv::imread((folder / "object_mask.png").string(), cv::IMREAD_GRAYSCALE);
-    if (mask.size() != truth.with.size() || mask.size() != truth.without.size())
-        throw InputError((folder / "object_mask.png").string(), "differs in size from the truth");
+    MaskImage mask = cv::imread((folder / "object_mask.png").string(), cv::IMREAD_GRAYSCALE);
+    truth.reduction = std::max(1, mask.cols / truth.with.cols);
+    const cv::Size full = mask.size();
+    if (full != truth.with.size() * truth.reduction || truth.with.size() != truth.without.size())
+        throw InputError((folder / "object_mask.png").string(),
+                         "its size is no multiple of the truth's");
+    mask = reduced(mask, truth.reduction);
     const MaskImage marked(mask > 2);
-    const MaskImage near = grown(marked, 17);
-    const cv::Mat_<double> change = influence(clipped(truth.with), clipped(truth.without));
+    const MaskImage near = grown(marked, truth.side(17));
+    const cv::Mat_<double> change =
+        influence(clipped(truth.with), clipped(truth.without), truth.side(21));
     truth.object = mask > 127;
-    truth.contact = near & ~grown(marked, 3);
+    truth.contact = near & ~grown(marked, truth.side(3));
     truth.shadow = (change > 0.02) & ~near;
-    truth.far = grown(MaskImage((change > 0.005) | near), 121) == 0;
+    const MaskImage far(grown(MaskImage((change > 0.005) | near), truth.side(121)) == 0);
+    cv::resize(far, truth.far, full, 0.0, 0.0, cv::INTER_NEAREST);
     return truth;
 }
 
@@ -184,15 +204,15 @@ double residual(const Vec3Image& image, const Truth& truth, const MaskImage& reg
 
 Score score(const Vec3Image& image, const Truth& truth)
 {
-    return {residual(image, truth, truth.object, 5),
-            residual(image, truth, truth.contact, 3),
-            residual(image, truth, truth.shadow, 15)};
+    return {residual(image, truth, truth.object, truth.side(5)),
+            residual(image, truth, truth.contact, truth.side(3)),
+            residual(image, truth, truth.shadow, truth.side(15))};
 }
 
 /// The photograph, decoded without error, times the true ratio of each pixel.
 Score bestPossible(const Vec3Image& plate_codes, const Truth& truth)
 {
-    const Vec3Image plate = linearised(plate_codes, truth.inverse);
+    const Vec3Image plate = reduced(linearised(plate_codes, truth.inverse), truth.reduction);
     Vec3Image floor;
     cv::max(truth.without, cv::Scalar::all(1e-9), floor);
     const Vec3Image ratio(truth.with / floor);
@@ -241,9 +261,10 @@ void measure(std::filesystem::path folder, InsertOptions options, bool both)
 {
     if (!folder.has_filename()) folder = folder.parent_path();
     const std::string room = folder.filename().string();
-    const Truth truth = readTruth(folder);
+    const std::filesystem::path apart = folder / "truth";
+    const Truth truth = readTruth(std::filesystem::exists(apart) ? apart : folder);
     const Vec3Image plate = eightBitCodes(readPhoto(folder / "plate.jpg").image);
-    if (plate.size() != truth.with.size())
+    if (plate.size() != truth.far.size())
         throw InputError((folder / "plate.jpg").string(), "has another size than the truth");
     printScore(room, "bound", bestPossible(plate, truth));
     fmt::print("\n");
@@ -254,8 +275,9 @@ void measure(std::filesystem::path folder, InsertOptions options, bool both)
         Progress silent;
         const InsertResult result = insertObjects(project, options, silent);
         const Vec3Image codes = eightBitCodes(result.composite.image);
-        printScore(
-            room, with_exif ? "exif" : "lines", score(linearised(codes, truth.inverse), truth));
+        printScore(room,
+                   with_exif ? "exif" : "lines",
+                   score(reduced(linearised(codes, truth.inverse), truth.reduction), truth));
         printRest(result, touched(codes, plate, truth.far));
     }
 }
