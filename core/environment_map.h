@@ -13,6 +13,9 @@ namespace insitu {
 /// Directions are in the world frame.
 struct EnvironmentMap {
     Image<Rgb> pixels;
+    /// Share of each texel, [0, 1], whose radiance is only a lower bound: clipped in every
+    /// exposure. Empty: of none.
+    Image<float> clipped{};
 };
 
 [[nodiscard]] glm::dvec2 environmentUvFromDirection(glm::dvec3 unit_direction);

@@ -21,6 +21,24 @@ double totalArea(const SceneProxy& proxy)
     return sum;
 }
 
+/// Clipped lights are stronger than they look: draws them at least this often.
+constexpr double kClippedShare = 0.3;
+
+template <class IsClipped>
+void liftClipped(std::vector<double>& weights, const IsClipped& is_clipped)
+{
+    double clipped = 0.0;
+    double total = 0.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+        total += weights[i];
+        if (is_clipped(i)) clipped += weights[i];
+    }
+    if (!(clipped > 0.0) || clipped >= kClippedShare * total) return;
+    const double lift = kClippedShare / (1.0 - kClippedShare) * (total - clipped) / clipped;
+    for (std::size_t i = 0; i < weights.size(); ++i)
+        if (is_clipped(i)) weights[i] *= lift;
+}
+
 /// The proxy, once the options are found valid: the members are made from both.
 const SceneProxy& checked(const SceneProxy& proxy, const RoomLightOptions& options)
 {
@@ -55,6 +73,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
       probe_saw_(radiance_.size(), 0),
       photo_saw_(radiance_.size(), 0),
       gap_(radiance_.size(), 0),
+      clipped_(radiance_.size(), 0),
       cell_irradiance_(proxy,
                        std::max(options.cell_m, std::sqrt(totalArea(proxy) / (kMaxTexels / 64.0)))),
       cell_reflectance_(cell_irradiance_)
@@ -70,7 +89,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
 
     // Surfaces that nobody saw need the light that falls on them, which needs all surfaces: twice.
     gatherCells(options, progress);
-    fitUnseenOutside(options, progress);
+    fitUnmeasured(options, progress);
     reportCoverage(options.reference_point_m);
     if (hasFinding(findings_, "light-unseen-surfaces")) {
         fillUnseen();
@@ -105,7 +124,10 @@ void RoomLight::buildTables(glm::dvec3 reference)
             surface_power += weights[i];
         }
     }
-    if (surface_power > 0.0) texel_table_.emplace(weights);
+    if (surface_power > 0.0) {
+        liftClipped(weights, [&](std::size_t i) { return clipped_[i] != 0; });
+        texel_table_.emplace(weights);
+    }
 
     // Far directions: seen ones by their power, extended ones rarely.
     const Image<Rgb>& far = outside_.pixels;
@@ -120,7 +142,10 @@ void RoomLight::buildTables(glm::dvec3 reference)
             if (outside_seen_[i]) far_power += power;
         }
     }
-    if (far_power > 0.0) outside_table_.emplace(far_weights);
+    if (far_power > 0.0) {
+        liftClipped(far_weights, [&](std::size_t i) { return outside_band_[i] == kClippedBand; });
+        outside_table_.emplace(far_weights);
+    }
 
     portal_triangles_.clear();
     portal_cumulative_area_.clear();

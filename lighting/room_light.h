@@ -6,13 +6,15 @@
 #include "core/progress.h"
 #include "lighting/alias_table.h"
 #include "lighting/face_grid.h"
+#include "lighting/light_fit.h"
 #include "lighting/light_source.h"
-#include "lighting/opening_fit.h"
 #include "reconstruct/scene_proxy.h"
 
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 namespace insitu {
 
@@ -23,9 +25,9 @@ struct RoomLightOptions {
     double cell_m = 0.15;
     /// Rays per cell for its irradiance. Unitless, > 0.
     int rays_per_cell = 256;
-    /// Scale the light from directions through openings that the probe did not see so that it
-    /// explains how bright the surfaces are (opening_fit.h).
-    bool fit_unseen_outside = true;
+    /// Scale light that the probe could not measure (unseen directions through openings, clipped
+    /// lights) so that it explains how bright the surfaces are (light_fit.h).
+    bool fit_unmeasured = true;
     /// Where the objects stand: light is drawn by what it does there.
     glm::dvec3 reference_point_m{0.0};
     std::uint64_t seed = 1;
@@ -46,8 +48,9 @@ struct PhotographedRadiance {
 /// it did not see takes the photograph's, or, unseen by both, gathers light with its face's mean
 /// reflectance ([GibCha03] 4.2; 0.5 where nothing of the face was seen). A direction through an
 /// opening that the probe did not see through takes the nearest one that it did, scaled so that the
-/// light on each surface explains its measured radiance (opening_fit.h). Rays that miss the proxy
-/// see the probe's environment at infinity.
+/// light on each surface explains its measured radiance (light_fit.h). Rays that miss the proxy
+/// see the probe's environment at infinity. Lights that are clipped in every exposure are scaled in
+/// the same way, when a patch of their light tells how strong they are.
 ///
 /// A solid box stands for furniture that may have gaps: where the probe, looking at its face
 /// towards an opening, saw more light than any surface there could reflect, it saw the opening
@@ -55,7 +58,8 @@ struct PhotographedRadiance {
 ///
 /// Findings: "light-unseen-surfaces" (share of the area), "light-opening-extended" (share of the
 /// light through openings that is taken from the nearest seen direction), "light-opening-unseen",
-/// "light-opening-fitted" (the scale), "light-through-gaps".
+/// "light-opening-fitted" (the scale), "light-through-gaps", "light-clipped-solved" (the strength),
+/// "light-clipped-unsolved" (the bound).
 class RoomLight : public LightSource {
 public:
     RoomLight(const SceneProxy& proxy,
@@ -115,7 +119,10 @@ private:
     void extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 center);
     void buildTables(glm::dvec3 reference);
     void gatherCells(const RoomLightOptions& options, Progress& progress);
-    void fitUnseenOutside(const RoomLightOptions& options, Progress& progress);
+    void fitUnmeasured(const RoomLightOptions& options, Progress& progress);
+    [[nodiscard]] std::vector<LitCell> litCells() const;
+    [[nodiscard]] bool scaleOpenings(const LightFit& fit, std::span<const LitCell> cells);
+    [[nodiscard]] bool scaleClipped(const LightFit& fit, std::span<const LitCell> cells);
     void scaleDoubtfulIrradiance();
     void fillUnseen();
     void reportCoverage(glm::dvec3 reference);
@@ -130,7 +137,7 @@ private:
         glm::dvec3 lower{0.0};
         glm::dvec3 higher{0.0};
     };
-    using BandIrradiance = std::array<glm::dvec3, kOpeningBands>;
+    using BandIrradiance = std::array<glm::dvec3, kLightBands>;
     [[nodiscard]] glm::dvec3 cellIrradianceAt(glm::dvec3 x,
                                               glm::dvec3 normal,
                                               std::uint64_t cell,
@@ -142,16 +149,18 @@ private:
     FaceGrid<Rgb> radiance_;               ///< every texel outside openings is valid when built
     std::vector<std::uint8_t> probe_saw_;  ///< per texel of radiance_
     std::vector<std::uint8_t> photo_saw_;
-    std::vector<std::uint8_t> gap_;  ///< per texel of radiance_: light passes
+    std::vector<std::uint8_t> gap_;      ///< per texel of radiance_: light passes
+    std::vector<std::uint8_t> clipped_;  ///< per texel of radiance_: a lower bound
     FaceGrid<Rgb> cell_irradiance_;
     FaceGrid<Rgb> cell_reflectance_;
     EnvironmentMap outside_;  ///< what lies beyond the openings, or everywhere
     std::vector<std::uint8_t> outside_seen_;
-    /// Of a direction the probe did not see through an opening: where it lies from those it saw.
-    static constexpr std::uint8_t kSeenBand = 255;
+    /// The LightBand of a far direction; kMeasured: none.
+    static constexpr std::uint8_t kMeasured = 255;
     std::vector<std::uint8_t> outside_band_;
-    std::vector<BandIrradiance> cell_bands_;  ///< part of cell_irradiance_ from unseen directions
+    std::vector<BandIrradiance> cell_bands_;  ///< part of cell_irradiance_ of each band
     std::vector<Rgb> cell_radiance_;
+    std::vector<std::uint8_t> cell_shines_;  ///< holds clipped texels: a lamp, not a lit surface
     std::vector<Doubt> cell_doubt_;
     FaceGrid<Rgb> irradiance_scale_;
     Image<std::uint8_t> see_through_;  ///< per pixel of the photograph

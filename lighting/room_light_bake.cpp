@@ -23,8 +23,19 @@ std::uint8_t bandOf(glm::vec3 direction, glm::vec3 nearest)
     const float higher = std::asin(std::clamp(direction.y, -1.0f, 1.0f)) -
                          std::asin(std::clamp(nearest.y, -1.0f, 1.0f));
     const float apart = std::acos(std::clamp(glm::dot(direction, nearest), -1.0f, 1.0f));
-    if (std::abs(higher) < 0.7f * apart) return 2;
-    return higher > 0.0f ? 0 : 1;
+    if (std::abs(higher) < 0.7f * apart) return kBesideBand;
+    return higher > 0.0f ? kAboveBand : kBelowBand;
+}
+
+/// Share of a direction's texel that is clipped in every exposure.
+float clippedShare(const EnvironmentMap& probe, glm::dvec3 direction)
+{
+    if (probe.clipped.empty()) return 0.0f;
+    const glm::dvec2 uv = environmentUvFromDirection(direction);
+    const int x = static_cast<int>(uv.x * probe.clipped.width());
+    const int y = static_cast<int>(uv.y * probe.clipped.height());
+    return probe.clipped(std::clamp(x, 0, probe.clipped.width() - 1),
+                         std::clamp(y, 0, probe.clipped.height() - 1));
 }
 
 }  // namespace
@@ -74,6 +85,7 @@ void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progre
                 Rgb sum(0.0f);
                 int seen = 0;
                 int solid = 0;
+                float bound = 0.0f;
                 for (int k = 0; k < kBakeGrid * kBakeGrid; ++k) {
                     const glm::dvec2 inside((k % kBakeGrid + 0.5) / kBakeGrid,
                                             (k / kBakeGrid + 0.5) / kBakeGrid);
@@ -87,12 +99,14 @@ void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progre
                                         glm::dot(way, proxy_.faces()[face].normal) < 0.0;
                     if (!facing || !proxy_.mutuallyVisible(center, point)) continue;
                     sum += lookUp(probe, glm::normalize(way));
+                    bound += clippedShare(probe, glm::normalize(way));
                     ++seen;
                 }
                 radiance_.setValid(index, solid > 0);
                 if (seen == 0) continue;
                 radiance_[index] = sum / static_cast<float>(seen);
                 probe_saw_[index] = 1;
+                clipped_[index] = bound > 0.5f * static_cast<float>(seen);
             }
         });
     }
@@ -130,7 +144,7 @@ void RoomLight::extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 cen
     const int height = probe.pixels.height();
     outside_ = probe;
     outside_seen_.assign(probe.pixels.pixelCount(), 0);
-    outside_band_.assign(probe.pixels.pixelCount(), kSeenBand);
+    outside_band_.assign(probe.pixels.pixelCount(), kMeasured);
 
     // A texel is seen when the ways through its centre and corners all leave the room.
     const auto leaves = [&](double x, double y) {
@@ -142,7 +156,10 @@ void RoomLight::extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 cen
             const double row = static_cast<double>(y);
             const bool seen = leaves(x + 0.5, row + 0.5) && leaves(x, row) && leaves(x + 1, row) &&
                               leaves(x, row + 1) && leaves(x + 1, row + 1);
-            outside_seen_[static_cast<std::size_t>(y * width + x)] = seen;
+            const std::size_t i = static_cast<std::size_t>(y * width + x);
+            outside_seen_[i] = seen;
+            if (seen && !probe.clipped.empty() && probe.clipped(x, static_cast<int>(y)) > 0.0f)
+                outside_band_[i] = kClippedBand;
         }
     });
 

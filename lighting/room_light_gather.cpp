@@ -1,7 +1,7 @@
 #include "core/color.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "lighting/opening_fit.h"
+#include "lighting/light_fit.h"
 #include "lighting/room_light.h"
 #include "lighting/sampling.h"
 #include "lighting/see_through.h"
@@ -23,6 +23,8 @@ constexpr float kUnseenReflectance = 0.5f;
 /// Share of a cell's irradiance that may be in doubt before the cell says little of its face.
 constexpr double kLittleDoubt = 0.1;
 constexpr std::size_t kMinFaceCells = 20;
+/// Standard deviation of the logarithm of a clipped light's strength at which it is believed.
+constexpr double kBelievedLogSigma = 0.3;
 
 }  // namespace
 
@@ -45,7 +47,9 @@ glm::dvec3 RoomLight::cellIrradianceAt(glm::dvec3 x,
         const double share = 1.0 / options.rays_per_cell;
         if (!arrival.hit || arrival.hit->opening) {
             const std::uint8_t band = outsideBand(direction);
-            if (band != kSeenBand) (*bands)[band] += part * share;
+            if (band != kMeasured) (*bands)[band] += part * share;
+        } else if (clipped_[radiance_.texelAt(arrival.hit->face, arrival.hit->uv)]) {
+            (*bands)[kClippedBand] += part * share;
         } else if (proxy_.faces()[arrival.hit->face].solid) {
             const double weight = cosine / (cosine / pi + arrival.light.pdf) * share;
             const glm::dvec3 change =
@@ -76,6 +80,7 @@ void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
     cell_bands_.resize(cell_irradiance_.size());
     cell_doubt_.resize(cell_irradiance_.size());
     cell_radiance_.resize(cell_irradiance_.size());
+    cell_shines_.resize(cell_irradiance_.size());
     parallelFor(0, static_cast<std::int64_t>(cell_irradiance_.size()), [&](std::int64_t number) {
         const std::size_t cell = static_cast<std::size_t>(number);
         const auto texel = cell_irradiance_.texel(cell);
@@ -85,12 +90,14 @@ void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
 
         Rgb radiance(0.0f);
         int count = 0;
+        cell_shines_[cell] = 0;
         for (int k = 0; k < kGrid * kGrid; ++k) {
             const glm::dvec2 uv =
                 cell_irradiance_.uv(texel, {(k % kGrid + 0.5) / kGrid, (k / kGrid + 0.5) / kGrid});
             if (!radiance_.valid(radiance_.texelAt(texel.face, uv))) continue;
             radiance += faceRadiance(texel.face, uv);
             ++count;
+            if (clipped_[radiance_.texelAt(texel.face, uv)]) cell_shines_[cell] = 1;
         }
         cell_irradiance_.setValid(cell, count > 0);
         cell_reflectance_.setValid(cell, count > 0);
@@ -111,18 +118,14 @@ void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
     progress.checkpoint();
 }
 
-void RoomLight::fitUnseenOutside(const RoomLightOptions& options, Progress& progress)
+std::vector<LitCell> RoomLight::litCells() const
 {
-    if (portal_triangles_.empty() || !options.fit_unseen_outside) return;
     std::vector<LitCell> cells;
-    double guessed = 0.0;
-    double total = 0.0;
     for (std::size_t i = 0; i < cell_irradiance_.size(); ++i) {
         if (!cell_irradiance_.valid(i)) continue;
         const auto texel = cell_irradiance_.texel(i);
-        const std::size_t here =
-            radiance_.texelAt(texel.face, cell_irradiance_.uv(texel, glm::dvec2(0.5)));
-        if (!probe_saw_[here] && !photo_saw_[here]) continue;
+        const std::size_t here = radiance_.texelAt(texel.face, cell_irradiance_.centerUv(i));
+        if ((!probe_saw_[here] && !photo_saw_[here]) || cell_shines_[i]) continue;
         LitCell cell;
         cell.face = texel.face;
         cell.area =
@@ -131,29 +134,90 @@ void RoomLight::fitUnseenOutside(const RoomLightOptions& options, Progress& prog
         cell.radiance = glm::dvec3(cell_radiance_[i]);
         cell.guessed = cell_bands_[i];
         cell.known = glm::dvec3(cell_irradiance_[i]);
-        for (const glm::dvec3& band : cell.guessed) {
+        for (const glm::dvec3& band : cell.guessed)
             cell.known = glm::max(cell.known - band, glm::dvec3(0.0));
-            guessed += cell.area * luminance(Rgb(band));
-        }
-        total += cell.area * luminance(cell_irradiance_[i]);
         cells.push_back(cell);
     }
-    if (!(guessed > 0.01 * total)) return;
-    const auto factors = fitOpeningBands(cells);
+    return cells;
+}
+
+void RoomLight::fitUnmeasured(const RoomLightOptions& options, Progress& progress)
+{
+    if (!options.fit_unmeasured) return;
+    const std::vector<LitCell> cells = litCells();
+    const LightFit fit = fitLightBands(cells);
+    const bool openings = scaleOpenings(fit, cells);
+    const bool clipped = scaleClipped(fit, cells);
+    if (!openings && !clipped) return;
+    buildTables(options.reference_point_m);
+    gatherCells(options, progress);
+}
+
+bool RoomLight::scaleOpenings(const LightFit& fit, std::span<const LitCell> cells)
+{
+    double guessed = 0.0;
+    double total = 0.0;
+    for (const LitCell& cell : cells) {
+        glm::dvec3 all = cell.known;
+        for (std::size_t band = 0; band < kLightBands; ++band) {
+            all += cell.guessed[band];
+            if (band != kClippedBand) guessed += cell.area * luminance(Rgb(cell.guessed[band]));
+        }
+        total += cell.area * luminance(Rgb(all));
+    }
+    if (!(guessed > 0.01 * total)) return false;
     for (std::size_t i = 0; i < outside_band_.size(); ++i)
-        if (outside_band_[i] != kSeenBand)
-            outside_.pixels.pixels()[i] *= Rgb(factors[outside_band_[i]]);
+        if (outside_band_[i] != kMeasured && outside_band_[i] != kClippedBand)
+            outside_.pixels.pixels()[i] *= Rgb(fit.factors[outside_band_[i]]);
     findings_.push_back(
         {Severity::Info,
          "light-opening-fitted",
          fmt::format("the light through the openings from directions the probe did not see was "
                      "scaled by {:.2f} above, {:.2f} below and {:.2f} beside what it saw "
                      "(luminance), so that it explains how bright the surfaces are",
-                     luminance(Rgb(factors[0])),
-                     luminance(Rgb(factors[1])),
-                     luminance(Rgb(factors[2])))});
-    buildTables(options.reference_point_m);
-    gatherCells(options, progress);
+                     luminance(Rgb(fit.factors[kAboveBand])),
+                     luminance(Rgb(fit.factors[kBelowBand])),
+                     luminance(Rgb(fit.factors[kBesideBand])))});
+    return true;
+}
+
+bool RoomLight::scaleClipped(const LightFit& fit, std::span<const LitCell> cells)
+{
+    double bound = 0.0;
+    double total = 0.0;
+    for (const LitCell& cell : cells) {
+        bound += cell.area * luminance(Rgb(cell.guessed[kClippedBand]));
+        total += cell.area * luminance(Rgb(cell.known + cell.guessed[kClippedBand]));
+    }
+    if (!(bound > 0.0)) return false;
+    const glm::dvec3 sigma = fit.log_sigma[kClippedBand];
+    const glm::dvec3 factor = fit.factors[kClippedBand];
+    if (std::max({sigma.r, sigma.g, sigma.b}) > kBelievedLogSigma) {
+        findings_.push_back(
+            {Severity::Warning,
+             "light-clipped-unsolved",
+             fmt::format("lights that are clipped in every exposure give at least {:.2g} % of the "
+                         "light on the surfaces, perhaps much more, and no patch of their light "
+                         "tells: shadows may be too weak; add shorter exposures",
+                         100.0 * bound / total)});
+        return false;
+    }
+    for (std::size_t i = 0; i < outside_band_.size(); ++i)
+        if (outside_band_[i] == kClippedBand) outside_.pixels.pixels()[i] *= Rgb(factor);
+    for (std::size_t i = 0; i < clipped_.size(); ++i)
+        if (clipped_[i]) radiance_[i] *= Rgb(factor);
+    findings_.push_back(
+        {Severity::Info,
+         "light-clipped-solved",
+         fmt::format(
+             "lights that are clipped in every exposure were scaled by {:.3g} (red), {:.3g} "
+             "(green), {:.3g} (blue), each within about {:.0f} %, so that they explain how "
+             "bright the surfaces are that they light",
+             factor.r,
+             factor.g,
+             factor.b,
+             100.0 * std::max({sigma.r, sigma.g, sigma.b}))});
+    return true;
 }
 
 Rgb RoomLight::radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const

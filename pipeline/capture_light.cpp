@@ -3,6 +3,7 @@
 #include "core/io/json.h"
 #include "pipeline/insert.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace insitu {
@@ -29,14 +30,20 @@ EnvironmentMap readEnvironment(const std::filesystem::path& path)
     return environment;
 }
 
+/// Light of the probe's picture, and which pixels are only a lower bound (empty: none).
+struct ProbePicture {
+    Image<Rgb> radiance;
+    Image<Rgb> clipped;
+};
+
 /// Brackets of encoded photographs need a response; a single radiance file is linear already.
-Image<Rgb> probeRadiance(const ProjectProbe& probe,
-                         const InsertOptions& options,
-                         CapturedLight& light)
+ProbePicture probePicture(const ProjectProbe& probe,
+                          const InsertOptions& options,
+                          CapturedLight& light)
 {
     if (probe.images.size() == 1 && isRadianceFile(probe.images.front().path)) {
         light.response = ResponseCurve::srgb();
-        return readRadiance(probe.images.front().path).pixels;
+        return {readRadiance(probe.images.front().path).pixels, {}};
     }
     std::vector<std::filesystem::path> files;
     std::vector<Exposure> exposures;
@@ -59,7 +66,22 @@ Image<Rgb> probeRadiance(const ProjectProbe& probe,
     }
     MergeResult merged = mergeBracket(bracket, light.response, options.merge);
     append(light.findings, merged.findings);
-    return std::move(merged.radiance.pixels);
+    ProbePicture picture{std::move(merged.radiance.pixels), {}};
+    if (merged.clipped_fraction > 0.0) {
+        picture.clipped = Image<Rgb>(merged.clipped.width(), merged.clipped.height());
+        for (std::size_t i = 0; i < merged.clipped.pixelCount(); ++i)
+            picture.clipped.pixels()[i] = Rgb(merged.clipped.pixels()[i]);
+    }
+    return picture;
+}
+
+/// From a picture of ones where it is clipped; a mirror that reflects little makes them larger.
+Image<float> clippedShareOf(const Image<Rgb>& image)
+{
+    Image<float> red(image.width(), image.height());
+    for (std::size_t i = 0; i < image.pixelCount(); ++i)
+        red.pixels()[i] = std::min(image.pixels()[i].r, 1.0f);
+    return red;
 }
 
 }  // namespace
@@ -77,9 +99,10 @@ CapturedLight captureLight(const Project& project,
     }
     const ProjectProbe& probe = *project.light.probe;
     light.center_m = probe.center_m;
-    const Image<Rgb> radiance = probeRadiance(probe, options, light);
+    const ProbePicture picture = probePicture(probe, options, light);
+    const Image<Rgb>& radiance = picture.radiance;
     if (probe.kind == ProbeKind::LatLong) {
-        light.environment.pixels = radiance;
+        light.environment = {radiance, clippedShareOf(picture.clipped)};
         return light;
     }
 
@@ -96,6 +119,10 @@ CapturedLight captureLight(const Project& project,
     LightProbe unwrapped = unwrapMirrorBall(radiance, probe.ball, camera, unwrap);
     append(light.findings, unwrapped.findings);
     light.environment = std::move(unwrapped.environment);
+    // Which texels are clipped is unwrapped as if it were light.
+    if (!picture.clipped.empty())
+        light.environment.clipped = clippedShareOf(
+            unwrapMirrorBall(picture.clipped, probe.ball, camera, unwrap).environment.pixels);
     return light;
 }
 

@@ -34,7 +34,7 @@ void parts(auto& archive, PartsOf<ResponseCurve> auto& v)
 }
 void parts(auto& archive, PartsOf<EnvironmentMap> auto& v)
 {
-    archive(v.pixels);
+    archive(v.pixels, v.clipped);
 }
 void parts(auto& archive, PartsOf<CapturedLight> auto& v)
 {
@@ -101,7 +101,7 @@ void parts(auto& archive, PartsOf<MergeOptions> auto& v)
 }
 void parts(auto& archive, PartsOf<RoomLightOptions> auto& v)
 {
-    archive(v.texel_m, v.cell_m, v.rays_per_cell, v.fit_unseen_outside, v.reference_point_m);
+    archive(v.texel_m, v.cell_m, v.rays_per_cell, v.fit_unmeasured, v.reference_point_m);
     archive(v.seed);
 }
 void parts(auto& archive, PartsOf<PathOptions> auto& v)

@@ -88,7 +88,7 @@ TEST(RoomLight, WhatIsSeenThroughAnOpeningStaysAtInfinity)
     const glm::dvec3 center(0.0, 1.5, 0.0);
     // The fit would try to explain walls that are darker than any such window makes them.
     RoomLightOptions options = coarse();
-    options.fit_unseen_outside = false;
+    options.fit_unmeasured = false;
     // Outside, radiance depends on the direction; walls are dark.
     const EnvironmentMap probe = environmentOf(256, [&](glm::dvec3 d) {
         const bool window = d.x > 0 && std::abs(d.z / d.x) < 0.49 && std::abs(d.y / d.x) < 0.245;
@@ -117,7 +117,7 @@ TEST(RoomLight, ReprojectedLightKeepsTheProbesIrradiance)
         return Rgb(static_cast<float>(1.0 + d.x), static_cast<float>(1.2 + d.y * d.y), 1.0f);
     });
     RoomLightOptions options = coarse();
-    options.fit_unseen_outside = false;
+    options.fit_unmeasured = false;
     const RoomLight light(proxy, probe, center, std::nullopt, options, g_silent);
     for (const glm::dvec3& normal : {glm::dvec3(0, 1, 0), glm::dvec3(1, 0, 0)}) {
         glm::dvec3 sum(0.0);
@@ -222,7 +222,7 @@ TEST(RoomLight, LightPassesThroughTheGapsThatTheProbeSaw)
             return Rgb(blind ? through_blind : 0.1f);
         });
         RoomLightOptions options = coarse();
-        options.fit_unseen_outside = false;
+        options.fit_unmeasured = false;
         return RoomLight(proxy, probe, center, std::nullopt, options, g_silent);
     };
     const glm::dvec3 x(-1.0, 1.5, 0.0);
@@ -264,6 +264,72 @@ TEST(RoomLight, ABoxThatExplainsNothingDoesNotDarken)
     };
     // The upper bound leaves out what would bounce once more: most of the way, not all of it.
     EXPECT_LT(reflectance(*below) / reflectance(*beside), 1.3f);
+}
+
+/// A white room in which everything has radiance 1, and a sun through the window that the probe has
+/// as radiance 20 at most: 50 times too little, as the patch on the floor shows when `patch`.
+EnvironmentMap probeWithClippedSun(const SceneProxy& proxy, glm::dvec3 center, bool patch)
+{
+    constexpr double kSunRadiance = 20.0;
+    constexpr double kTimes = 50.0;
+    const glm::dvec3 to_sun = glm::normalize(glm::dvec3(1.5, 1.0, 0.2));
+    const auto sun = [&](glm::dvec3 d) { return glm::dot(d, to_sun) > std::cos(0.03); };
+    EnvironmentMap probe =
+        environmentOf(256, [&](glm::dvec3 d) { return Rgb(sun(d) ? 20.0f : 1.0f); });
+    probe.clipped = Image<float>(512, 256);
+    double irradiance = 0.0;
+    for (int y = 0; y < 256; ++y)
+        for (int x = 0; x < 512; ++x) {
+            const glm::dvec3 d = environmentDirectionFromUv({(x + 0.5) / 512, (y + 0.5) / 256});
+            if (!sun(d)) continue;
+            probe.clipped(x, y) = 1.0f;
+            irradiance +=
+                kTimes * kSunRadiance * to_sun.y * environmentTexelSolidAngle(512, 256, y);
+        }
+    for (int y = 0; patch && y < 256; ++y)
+        for (int x = 0; x < 512; ++x) {
+            const glm::dvec3 d = environmentDirectionFromUv({(x + 0.5) / 512, (y + 0.5) / 256});
+            const auto floor = proxy.intersect(center, d);
+            if (!floor || floor->normal.y < 0.5) continue;
+            const auto above = proxy.intersect(floor->point, to_sun);
+            if (above && above->opening)
+                probe.pixels(x, y) = Rgb(1.0f + static_cast<float>(irradiance / pi));
+        }
+    return probe;
+}
+
+TEST(RoomLight, APatchOfSunTellsHowStrongAClippedSunIs)
+{
+    const SceneProxy proxy(roomWithWindow());
+    // From here the sun is seen through the window.
+    const glm::dvec3 center(0.2, 0.4, -0.2);
+    const glm::dvec3 to_sun = glm::normalize(glm::dvec3(1.5, 1.0, 0.2));
+    RoomLightOptions options = coarse();
+    options.cell_m = 0.2;
+    const RoomLight light(proxy,
+                          probeWithClippedSun(proxy, center, /*patch=*/true),
+                          center,
+                          std::nullopt,
+                          options,
+                          g_silent);
+    EXPECT_TRUE(hasFinding(light.findings(), "light-clipped-solved"));
+    // The aim for a sun that the shortest exposures would have shown: within 10 %.
+    EXPECT_NEAR(light.incident(center, to_sun).radiance.g, 1000.0f, 100.0f);
+}
+
+TEST(RoomLight, AClippedSunWithoutAPatchKeepsItsBound)
+{
+    RoomDescription room = roomWithWindow();
+    const SceneProxy proxy(room);
+    const glm::dvec3 center(0.2, 0.4, -0.2);
+    const glm::dvec3 to_sun = glm::normalize(glm::dvec3(1.5, 1.0, 0.2));
+    EnvironmentMap probe = probeWithClippedSun(proxy, center, /*patch=*/false);
+    // Too few places to tell: the cells are as large as the floor's faces allow.
+    RoomLightOptions options = coarse();
+    options.cell_m = 1.5;
+    const RoomLight light(proxy, probe, center, std::nullopt, options, g_silent);
+    EXPECT_FALSE(hasFinding(light.findings(), "light-clipped-solved"));
+    EXPECT_NEAR(light.incident(center, to_sun).radiance.g, 20.0f, 1.0f);
 }
 
 TEST(RoomLight, OptionsWithoutMeaningAreRefused)
