@@ -48,6 +48,11 @@ void checkFrame(const BracketFrame& frame, const BracketFrame& first)
                                      first.name,
                                      first.image.codes.width(),
                                      first.image.codes.height()));
+    INSITU_CHECK(frame.excluded.empty() || frame.excluded.sameSize(frame.image.codes),
+                 "{}: mask of {}x{}",
+                 frame.name,
+                 frame.excluded.width(),
+                 frame.excluded.height());
 }
 
 void checkMetadata(const std::vector<Exposure>& exposures,

@@ -1,0 +1,418 @@
+#include "capture/pair_alignment.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+// Inverse compositional Gauss-Newton [BakMat04], section 3.2: find the transform W with
+// b(W(x)) = a(x). With M a small motion of a's own pixels,
+//
+//     sum_i w_i (b(W(x_i)) - a(M(x_i)))^2,   a(M(x)) ~ a(x) + grad a . J p
+//
+// is linear in M's parameters p, and W <- W M^-1. The gradients and J are those of `a` and stay the
+// same. Parameters are all in pixels: x is taken about the picture's centre, u = (x - c) / h with
+// half diagonal h, so that a parameter of 1 moves the far corners by about a pixel.
+//
+// Weights fall with the residual (Cauchy's), its scale being the median one: people who walk
+// through the picture and rank matching that errs in places pull little.
+//
+// Certainty: with g_B the sum of w r J' grad a over block B of the picture and H the normal matrix,
+// cov p = H^-1 (sum_B g_B g_B') H^-1 [LiaZeg86], which counts blocks and not pixels: noise that
+// neighbours share, or a block that moves by itself, is seen for what it is.
+
+namespace insitu::detail {
+
+namespace {
+
+/// Points on a picture at most, and blocks a side that share them equally.
+constexpr int kMostPoints = 14'400;
+constexpr int kBlocksASide = 12;
+/// Distance from the border from which gradients are sound.
+constexpr int kMargin = 4;
+constexpr int kMostIterations = 30;
+/// Converged when no corner moves farther, pixels of the level.
+constexpr double kConverged = 2e-3;
+/// A step of more is a runaway: half diagonals.
+constexpr double kRunaway = 0.5;
+/// Share of the points that must lie in both pictures.
+constexpr double kLeastOverlap = 0.3;
+
+/// A model is known by its number of parameters.
+constexpr int kTranslation = 2;
+constexpr int kEuclidean = 3;
+constexpr int kHomography = 8;
+
+/// Binomial 1 4 6 4 1 both ways: standard deviation 1 pixel.
+Image<float> smoothed(const Image<float>& image)
+{
+    const int width = image.width();
+    const int height = image.height();
+    Image<float> rows(width, height);
+    for (int y = 0; y < height; ++y) {
+        const std::span<const float> in = image.row(y);
+        const std::span<float> out = rows.row(y);
+        const auto at = [&](int x) {
+            return in[static_cast<std::size_t>(std::clamp(x, 0, width - 1))];
+        };
+        const auto tap = [](float a, float b, float c, float d, float e) {
+            return (a + e + 4.0f * (b + d) + 6.0f * c) * (1.0f / 16.0f);
+        };
+        for (int x = 0; x < width; ++x) {
+            const auto i = static_cast<std::size_t>(x);
+            out[i] = x >= 2 && x + 2 < width
+                         ? tap(in[i - 2], in[i - 1], in[i], in[i + 1], in[i + 2])
+                         : tap(at(x - 2), at(x - 1), at(x), at(x + 1), at(x + 2));
+        }
+    }
+    Image<float> result(width, height);
+    for (int y = 0; y < height; ++y) {
+        std::array<std::span<const float>, 5> in;
+        for (int j = -2; j <= 2; ++j)
+            in[static_cast<std::size_t>(j + 2)] = rows.row(std::clamp(y + j, 0, height - 1));
+        const std::span<float> out = result.row(y);
+        for (std::size_t x = 0; x < out.size(); ++x)
+            out[x] = (in[0][x] + in[4][x] + 4.0f * (in[1][x] + in[3][x]) + 6.0f * in[2][x]) *
+                     (1.0f / 16.0f);
+    }
+    return result;
+}
+
+/// The points of one block with the strongest gradients, `most` at most, in their order.
+void choosePoints(const Image<float>& a,
+                  int block,
+                  int most,
+                  std::vector<RegistrationLevel::Point>& points)
+{
+    const int usable_width = a.width() - 2 * kMargin;
+    const int usable_height = a.height() - 2 * kMargin;
+    const auto edge = [&](int index, int length) {
+        return kMargin + length * index / kBlocksASide;
+    };
+    const int bx = block % kBlocksASide;
+    const int by = block / kBlocksASide;
+    std::vector<RegistrationLevel::Point> here;
+    std::vector<float> strengths;
+    for (int y = edge(by, usable_height); y < edge(by + 1, usable_height); ++y) {
+        for (int x = edge(bx, usable_width); x < edge(bx + 1, usable_width); ++x) {
+            const float gx = 0.5f * (a(x + 1, y) - a(x - 1, y));
+            const float gy = 0.5f * (a(x, y + 1) - a(x, y - 1));
+            const float strength = gx * gx + gy * gy;
+            if (!(strength > 0.0f)) continue;
+            here.push_back({static_cast<float>(x), static_cast<float>(y), a(x, y), gx, gy, block});
+            strengths.push_back(strength);
+        }
+    }
+    float least = 0.0f;
+    if (static_cast<int>(strengths.size()) > most) {
+        const auto rank = strengths.begin() + most;
+        std::nth_element(strengths.begin(), rank, strengths.end(), std::greater<>());
+        least = *rank;
+    }
+    for (const RegistrationLevel::Point& point : here)
+        if (point.gradient_x * point.gradient_x + point.gradient_y * point.gradient_y > least)
+            points.push_back(point);
+}
+
+/// From pixels of a level to coordinates about its centre, unit half diagonal.
+struct Frame {
+    Eigen::Matrix3d unit_from_level;
+    Eigen::Matrix3d level_from_unit;
+    double half_diagonal = 1.0;
+
+    explicit Frame(const Image<float>& image)
+    {
+        half_diagonal = 0.5 * std::hypot(image.width(), image.height());
+        level_from_unit << half_diagonal, 0, 0.5 * image.width(), 0, half_diagonal,
+            0.5 * image.height(), 0, 0, 1;
+        unit_from_level = level_from_unit.inverse();
+    }
+
+    /// The motion M of the parameters, in pixels of the level.
+    template <int N>
+    [[nodiscard]] Eigen::Matrix3d motion(const Eigen::Matrix<double, N, 1>& p) const
+    {
+        const Eigen::Matrix<double, N, 1> q = p / half_diagonal;
+        Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
+        m(0, 2) = q[0];
+        m(1, 2) = q[1];
+        if constexpr (N == kEuclidean) {
+            m(0, 0) = m(1, 1) = std::cos(q[2]);
+            m(1, 0) = std::sin(q[2]);
+            m(0, 1) = -m(1, 0);
+        } else if constexpr (N == kHomography) {
+            m(0, 0) += q[2];
+            m(0, 1) = q[3];
+            m(1, 0) = q[4];
+            m(1, 1) += q[5];
+            m(2, 0) = q[6];
+            m(2, 1) = q[7];
+        }
+        return level_from_unit * m * unit_from_level;
+    }
+};
+
+/// d(displacement)/d(parameters) at (u, v).
+template <int N>
+Eigen::Matrix<double, 2, N> displacementJacobian(double u, double v)
+{
+    Eigen::Matrix<double, 2, N> j = Eigen::Matrix<double, 2, N>::Zero();
+    j(0, 0) = j(1, 1) = 1.0;
+    if constexpr (N == kEuclidean) {
+        j(0, 2) = -v;
+        j(1, 2) = u;
+    } else if constexpr (N == kHomography) {
+        j.col(2) << u, 0.0;
+        j.col(3) << v, 0.0;
+        j.col(4) << 0.0, u;
+        j.col(5) << 0.0, v;
+        j.col(6) << -u * u, -u * v;
+        j.col(7) << -u * v, -v * v;
+    }
+    return j;
+}
+
+/// b at column and row index (x, y) inside the picture, bilinear.
+float sampleAt(const Image<float>& image, double x, double y)
+{
+    const int x0 = std::min(static_cast<int>(x), image.width() - 2);
+    const int y0 = std::min(static_cast<int>(y), image.height() - 2);
+    const auto tx = static_cast<float>(x - x0);
+    const auto ty = static_cast<float>(y - y0);
+    const float upper = image(x0, y0) + tx * (image(x0 + 1, y0) - image(x0, y0));
+    const float lower = image(x0, y0 + 1) + tx * (image(x0 + 1, y0 + 1) - image(x0, y0 + 1));
+    return upper + ty * (lower - upper);
+}
+
+/// The registration of one level while it is being solved.
+template <int N>
+class Registration {
+public:
+    explicit Registration(const RegistrationLevel& level) : level_(level), frame_(level.a)
+    {
+        jacobians_.reserve(level.points.size());
+        for (const RegistrationLevel::Point& point : level.points) {
+            const double u = (point.x + 0.5 - 0.5 * level.a.width()) / frame_.half_diagonal;
+            const double v = (point.y + 0.5 - 0.5 * level.a.height()) / frame_.half_diagonal;
+            const Eigen::RowVector2d gradient(point.gradient_x, point.gradient_y);
+            jacobians_.push_back(
+                (gradient * displacementJacobian<N>(u, v)).transpose().template cast<float>());
+        }
+        residuals_.resize(level.points.size());
+    }
+
+    RegistrationFit solve(const Eigen::Matrix3d& start)
+    {
+        const Eigen::Matrix3d full_from_level =
+            Eigen::Vector3d(level_.scale, level_.scale, 1.0).asDiagonal();
+        RegistrationFit fit;
+        Eigen::Matrix3d w = full_from_level.inverse() * start * full_from_level;
+        for (int i = 0; i < kMostIterations; ++i) {
+            if (!measure(w)) return fit;
+            accumulate();
+            const Parameters step = solveNormal(score_);
+            if (!step.allFinite() || step.norm() > kRunaway * frame_.half_diagonal) return fit;
+            w = w * frame_.motion<N>(step).inverse();
+            w /= w(2, 2);
+            if (cornerShift(frame_.motion<N>(step), level_.a.width(), level_.a.height()) <
+                kConverged)
+                break;
+        }
+        if (!measure(w)) return fit;
+        accumulate();
+        fit.valid = true;
+        fit.b_from_a = full_from_level * w * full_from_level.inverse();
+        fit.sigma_px = level_.scale * worstCornerSigma();
+        fit.correlation = correlation();
+        return fit;
+    }
+
+private:
+    using Parameters = Eigen::Matrix<double, N, 1>;
+    using Normal = Eigen::Matrix<double, N, N>;
+
+    /// Residuals b(W(x)) - a(x), NaN outside; false when too few are inside.
+    bool measure(const Eigen::Matrix3d& w)
+    {
+        std::size_t inside = 0;
+        sizes_.clear();
+        for (std::size_t i = 0; i < level_.points.size(); ++i) {
+            const RegistrationLevel::Point& point = level_.points[i];
+            const Eigen::Vector3d at = w * Eigen::Vector3d(point.x + 0.5, point.y + 0.5, 1.0);
+            const double x = at.x() / at.z() - 0.5;
+            const double y = at.y() / at.z() - 0.5;
+            residuals_[i] = std::numeric_limits<float>::quiet_NaN();
+            if (!(at.z() > 0.0 && x >= 0.0 && y >= 0.0 && x <= level_.b.width() - 1.0 &&
+                  y <= level_.b.height() - 1.0))
+                continue;
+            residuals_[i] = sampleAt(level_.b, x, y) - point.value;
+            sizes_.push_back(std::abs(residuals_[i]));
+            ++inside;
+        }
+        if (static_cast<double>(inside) <
+            std::max(4.0 * N, kLeastOverlap * static_cast<double>(level_.points.size())))
+            return false;
+        const auto middle = sizes_.begin() + static_cast<std::ptrdiff_t>(sizes_.size() / 2);
+        std::nth_element(sizes_.begin(), middle, sizes_.end());
+        // 1.4826: standard deviation of a normal distribution from its median size; Cauchy's
+        // weights at 2.4 of it keep 95 % of the efficiency.
+        robust_scale_ = std::max(2.4f * 1.4826f * *middle, 0.05f);
+        return true;
+    }
+
+    [[nodiscard]] float weightOf(float residual) const
+    {
+        const float q = residual / robust_scale_;
+        return 1.0f / (1.0f + q * q);
+    }
+
+    void accumulate()
+    {
+        normal_.setZero();
+        score_.setZero();
+        block_scores_.assign(static_cast<std::size_t>(level_.blocks), Parameters::Zero());
+        Eigen::Matrix<float, N, N> block_normal = Eigen::Matrix<float, N, N>::Zero();
+        Eigen::Matrix<float, N, 1> block_score = Eigen::Matrix<float, N, 1>::Zero();
+        for (std::size_t i = 0; i < level_.points.size(); ++i) {
+            if (const float r = residuals_[i]; !std::isnan(r)) {
+                const float weight = weightOf(r);
+                block_normal.noalias() += (weight * jacobians_[i]) * jacobians_[i].transpose();
+                block_score.noalias() += weight * r * jacobians_[i];
+            }
+            const bool block_ends = i + 1 == level_.points.size() ||
+                                    level_.points[i + 1].block != level_.points[i].block;
+            if (!block_ends) continue;
+            const auto block = static_cast<std::size_t>(level_.points[i].block);
+            block_scores_[block] = block_score.template cast<double>();
+            normal_ += block_normal.template cast<double>();
+            score_ += block_scores_[block];
+            block_normal.setZero();
+            block_score.setZero();
+        }
+        // Directions that nothing is known of must not blow up, but stay uncertain.
+        normal_.diagonal().array() += 1e-9 * normal_.trace() + 1e-12;
+    }
+
+    [[nodiscard]] Parameters solveNormal(const Parameters& right) const
+    {
+        return normal_.ldlt().solve(right);
+    }
+
+    [[nodiscard]] double worstCornerSigma() const
+    {
+        Normal scatter = Normal::Zero();
+        int used = 0;
+        for (const Parameters& score : block_scores_) {
+            if (score.isZero(0.0)) continue;
+            scatter += score * score.transpose();
+            ++used;
+        }
+        // As many blocks as parameters tell nothing of the spread.
+        if (used <= N + 1) return std::numeric_limits<double>::infinity();
+        const Normal inverse = normal_.inverse();
+        const Normal covariance = inverse * scatter * inverse * used / (used - N);
+        double worst = 0.0;
+        for (const double sx : {-1.0, 1.0}) {
+            for (const double sy : {-1.0, 1.0}) {
+                const auto j =
+                    displacementJacobian<N>(sx * 0.5 * level_.a.width() / frame_.half_diagonal,
+                                            sy * 0.5 * level_.a.height() / frame_.half_diagonal);
+                worst = std::max(worst, (j * covariance * j.transpose()).trace());
+            }
+        }
+        return std::sqrt(worst);
+    }
+
+    [[nodiscard]] double correlation() const
+    {
+        double n = 0.0;
+        double sa = 0.0;
+        double sb = 0.0;
+        double saa = 0.0;
+        double sbb = 0.0;
+        double sab = 0.0;
+        for (std::size_t i = 0; i < level_.points.size(); ++i) {
+            if (std::isnan(residuals_[i])) continue;
+            const RegistrationLevel::Point& point = level_.points[i];
+            const double weight =
+                point.gradient_x * point.gradient_x + point.gradient_y * point.gradient_y;
+            const double a = point.value;
+            const double b = point.value + residuals_[i];
+            n += weight;
+            sa += weight * a;
+            sb += weight * b;
+            saa += weight * a * a;
+            sbb += weight * b * b;
+            sab += weight * a * b;
+        }
+        const double variance = (saa - sa * sa / n) * (sbb - sb * sb / n);
+        return variance > 0.0 ? (sab - sa * sb / n) / std::sqrt(variance) : 0.0;
+    }
+
+    const RegistrationLevel& level_;
+    Frame frame_;
+    std::vector<Eigen::Matrix<float, N, 1>> jacobians_;
+    std::vector<float> residuals_;  ///< NaN: outside
+    std::vector<float> sizes_;
+    float robust_scale_ = 1.0f;
+    Normal normal_;
+    Parameters score_;
+    std::vector<Parameters> block_scores_;
+};
+
+}  // namespace
+
+double cornerDifference(const Eigen::Matrix3d& first,
+                        const Eigen::Matrix3d& second,
+                        int width,
+                        int height)
+{
+    double longest = 0.0;
+    for (const double x : {0.0, static_cast<double>(width)}) {
+        for (const double y : {0.0, static_cast<double>(height)}) {
+            const Eigen::Vector3d corner(x, y, 1.0);
+            longest = std::max(
+                longest, ((first * corner).hnormalized() - (second * corner).hnormalized()).norm());
+        }
+    }
+    return longest;
+}
+
+double cornerShift(const Eigen::Matrix3d& b_from_a, int width, int height)
+{
+    return cornerDifference(b_from_a, Eigen::Matrix3d::Identity(), width, height);
+}
+
+RegistrationLevel makeLevel(const Image<float>& a, const Image<float>& b, double scale)
+{
+    RegistrationLevel level;
+    level.a = smoothed(a);
+    level.b = smoothed(b);
+    level.scale = scale;
+    level.blocks = kBlocksASide * kBlocksASide;
+    for (int block = 0; block < level.blocks; ++block)
+        choosePoints(level.a, block, kMostPoints / level.blocks, level.points);
+    return level;
+}
+
+RegistrationFit fitLevel(const RegistrationLevel& level,
+                         AlignmentModel model,
+                         const Eigen::Matrix3d& b_from_a)
+{
+    switch (model) {
+        case AlignmentModel::Translation:
+            return Registration<kTranslation>(level).solve(b_from_a);
+        case AlignmentModel::Euclidean:
+            return Registration<kEuclidean>(level).solve(b_from_a);
+        case AlignmentModel::Homography:
+            return Registration<kHomography>(level).solve(b_from_a);
+    }
+    return {};
+}
+
+}  // namespace insitu::detail
