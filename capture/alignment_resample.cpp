@@ -48,6 +48,8 @@ public:
             return sample;
         const int x0 = std::min(static_cast<int>(column), std::max(codes.width() - 2, 0));
         const int y0 = std::min(static_cast<int>(row), std::max(codes.height() - 2, 0));
+        const auto tx = static_cast<float>(column - x0);
+        const auto ty = static_cast<float>(row - y0);
         Taps taps;
         for (int j = 0; j < 4; ++j) {
             for (int i = 0; i < 4; ++i) {
@@ -55,15 +57,15 @@ public:
                 const int py = std::clamp(y0 + j - 1, 0, codes.height() - 1);
                 const std::size_t tap = static_cast<std::size_t>(4 * j + i);
                 taps.code[tap] = codes(px, py);
-                const bool inner = (i == 1 || i == 2) && (j == 1 || j == 2);
+                const bool inner = (i == 1 || i == 2) && (j == 1 || j == 2) &&
+                                   isNear(i == 1 ? tx : 1.0f - tx) &&
+                                   isNear(j == 1 ? ty : 1.0f - ty);
                 if (frame_.excluded.empty() || frame_.excluded(px, py) == 0) continue;
                 if (inner) return sample;
                 taps.outer_excluded = true;
             }
         }
         sample.excluded = false;
-        const auto tx = static_cast<float>(column - x0);
-        const auto ty = static_cast<float>(row - y0);
         for (int c = 0; c < 3; ++c)
             sample.code[c] = static_cast<std::uint16_t>(interpolate(taps, c, tx, ty));
         return sample;
@@ -74,6 +76,9 @@ private:
         std::array<glm::u16vec3, 16> code;
         bool outer_excluded = false;
     };
+
+    /// Does a neighbour at this distance count? Not one a whole pixel away, up to rounding.
+    [[nodiscard]] static bool isNear(float distance) { return distance < 0.999f; }
 
     [[nodiscard]] int interpolate(const Taps& taps, int c, float tx, float ty) const
     {
@@ -86,8 +91,11 @@ private:
         const auto code = [&](int i, int j) {
             return static_cast<int>(taps.code[static_cast<std::size_t>(4 * j + i)][c]);
         };
-        if (std::max({code(1, 1), code(2, 1), code(1, 2), code(2, 2)}) > clip_code_)
-            return frame_.image.max_code;
+        for (int j = 1; j <= 2; ++j)
+            for (int i = 1; i <= 2; ++i)
+                if (code(i, j) > clip_code_ && isNear(i == 1 ? tx : 1.0f - tx) &&
+                    isNear(j == 1 ? ty : 1.0f - ty))
+                    return frame_.image.max_code;
         // A clipped or excluded tap farther out would pull through its negative weight: leave the
         // outer taps out.
         const bool bilinear = highest > clip_code_ || taps.outer_excluded;

@@ -19,57 +19,9 @@ constexpr double kLeastCorrelation = 0.35;
 /// An uncertainty of more is no answer, pixels of the full picture per 1000 of its long side.
 constexpr double kWorstSigmaPerMille = 1.0;
 /// A richer model must move a corner by this many standard deviations relative to the simpler one.
-constexpr double kSignificance = 3.0;
+constexpr double kSignificance = 4.0;
 /// and by at least this, pixels of the full picture.
 constexpr double kLeastGainPx = 0.05;
-/// The search prefers the smaller of two shifts that fit about equally: what the largest shift
-/// costs in correlation.
-constexpr double kShiftPenalty = 0.05;
-
-/// Correlation of a and b shifted, where both are.
-double shiftedCorrelation(const Image<float>& a, const Image<float>& b, int dx, int dy)
-{
-    double n = 0.0;
-    double sa = 0.0;
-    double sb = 0.0;
-    double saa = 0.0;
-    double sbb = 0.0;
-    double sab = 0.0;
-    for (int y = std::max(0, -dy); y < std::min(a.height(), b.height() - dy); ++y) {
-        for (int x = std::max(0, -dx); x < std::min(a.width(), b.width() - dx); ++x) {
-            const double va = a(x, y);
-            const double vb = b(x + dx, y + dy);
-            n += 1.0;
-            sa += va;
-            sb += vb;
-            saa += va * va;
-            sbb += vb * vb;
-            sab += va * vb;
-        }
-    }
-    const double variance = (saa - sa * sa / n) * (sbb - sb * sb / n);
-    return n > 0.0 && variance > 0.0 ? (sab - sa * sb / n) / std::sqrt(variance) : -1.0;
-}
-
-/// The translation that makes the coarsest images most alike, by trying all, in their pixels.
-Eigen::Vector2d searchTranslation(const Image<float>& a, const Image<float>& b, double most)
-{
-    const int radius = static_cast<int>(std::ceil(most));
-    Eigen::Vector2d best(0.0, 0.0);
-    double best_score = -2.0;
-    for (int dy = -radius; dy <= radius; ++dy) {
-        for (int dx = -radius; dx <= radius; ++dx) {
-            if (std::abs(dx) >= a.width() / 2 || std::abs(dy) >= a.height() / 2) continue;
-            const double share = (dx * dx + dy * dy) / (most * most);
-            const double score = shiftedCorrelation(a, b, dx, dy) - kShiftPenalty * share;
-            if (score > best_score) {
-                best_score = score;
-                best = {dx, dy};
-            }
-        }
-    }
-    return best;
-}
 
 /// The whole-picture part of a transform: how the middle moves.
 Eigen::Matrix3d translationOf(const Eigen::Matrix3d& b_from_a, int width, int height)
@@ -110,16 +62,14 @@ private:
         const std::optional<MatchedPyramids> images =
             matchPyramids(a_, b_, glm::dmat3(1.0), coarsening, reason);
         if (!images) return false;
-        for (std::size_t l = images->a.size(); l-- > 0;) {
-            const RegistrationLevel level = makeLevel(
-                images->a[l], images->b[l], images->factor * std::ldexp(1.0, static_cast<int>(l)));
-            if (l + 1 == images->a.size()) {
-                const double most = options_.max_shift_fraction * long_side_ / level.scale;
-                euclidean_.topRightCorner<2, 1>() =
-                    level.scale * searchTranslation(level.a, level.b, most);
-            }
-            fitCoarse(level);
-        }
+        std::vector<RegistrationLevel> levels;
+        for (std::size_t l = 0; l < images->a.size(); ++l)
+            levels.push_back(makeLevel(
+                images->a[l], images->b[l], images->factor * std::ldexp(1.0, static_cast<int>(l))));
+        euclidean_.topRightCorner<2, 1>() =
+            searchTranslation(levels, options_.max_shift_fraction * long_side_);
+        for (std::size_t l = levels.size(); l-- > 0;)
+            fitCoarse(levels[l]);
         return true;
     }
 

@@ -57,12 +57,18 @@ struct RegistrationLevel {
                                           const Image<float>& b,
                                           double scale);
 
+/// The translation that makes a and b most alike, by trying all up to `most` pixels of the full
+/// picture on the coarsest level; of several that fit equally well the smallest. Levels from fine
+/// to coarse; the result is in pixels of the full picture.
+[[nodiscard]] Eigen::Vector2d searchTranslation(const std::vector<RegistrationLevel>& levels,
+                                                double most);
+
 /// b_from_a, its certainty and how alike the images are then.
 struct RegistrationFit {
     bool valid = false;
     Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();  ///< pixels of the full picture
     double sigma_px = 0.0;     ///< of the worst corner, pixels of the full picture
-    double correlation = 0.0;  ///< of the points' values, weighted by their gradients, in [-1, 1]
+    double correlation = 0.0;  ///< of the gradients at the points, in [-1, 1]
 };
 
 /// Gauss-Newton from `b_from_a`. `valid` is false when it runs away or nothing overlaps.

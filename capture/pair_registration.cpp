@@ -5,10 +5,9 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <vector>
 
 // Inverse compositional Gauss-Newton [BakMat04], section 3.2: find the transform W with
 // b(W(x)) = a(x). With M a small motion of a's own pixels,
@@ -19,8 +18,10 @@
 // same. Parameters are all in pixels: x is taken about the picture's centre, u = (x - c) / h with
 // half diagonal h, so that a parameter of 1 moves the far corners by about a pixel.
 //
-// Weights fall with the residual (Cauchy's), its scale being the median one: people who walk
-// through the picture and rank matching that errs in places pull little.
+// Weights fall with the residual (Geman & McClure's [GemMcC87]), its scale being the median one:
+// people who walk through the picture and rank matching that errs in places pull little. A block of
+// the picture in which most points fit badly is itself one that moved: it counts by its points'
+// mean weight squared.
 //
 // Certainty: with g_B the sum of w r J' grad a over block B of the picture and H the normal matrix,
 // cov p = H^-1 (sum_B g_B g_B') H^-1 [LiaZeg86], which counts blocks and not pixels: noise that
@@ -30,16 +31,13 @@ namespace insitu::detail {
 
 namespace {
 
-/// Points on a picture at most, and blocks a side that share them equally.
-constexpr int kMostPoints = 14'400;
-constexpr int kBlocksASide = 12;
-/// Distance from the border from which gradients are sound.
-constexpr int kMargin = 4;
 constexpr int kMostIterations = 30;
 /// Converged when no corner moves farther, pixels of the level.
 constexpr double kConverged = 2e-3;
 /// A step of more is a runaway: half diagonals.
 constexpr double kRunaway = 0.5;
+/// Residuals of this many standard deviations have a quarter of the weight of small ones.
+constexpr float kRobustSigmas = 3.0f;
 /// Share of the points that must lie in both pictures.
 constexpr double kLeastOverlap = 0.3;
 
@@ -47,77 +45,6 @@ constexpr double kLeastOverlap = 0.3;
 constexpr int kTranslation = 2;
 constexpr int kEuclidean = 3;
 constexpr int kHomography = 8;
-
-/// Binomial 1 4 6 4 1 both ways: standard deviation 1 pixel.
-Image<float> smoothed(const Image<float>& image)
-{
-    const int width = image.width();
-    const int height = image.height();
-    Image<float> rows(width, height);
-    for (int y = 0; y < height; ++y) {
-        const std::span<const float> in = image.row(y);
-        const std::span<float> out = rows.row(y);
-        const auto at = [&](int x) {
-            return in[static_cast<std::size_t>(std::clamp(x, 0, width - 1))];
-        };
-        const auto tap = [](float a, float b, float c, float d, float e) {
-            return (a + e + 4.0f * (b + d) + 6.0f * c) * (1.0f / 16.0f);
-        };
-        for (int x = 0; x < width; ++x) {
-            const auto i = static_cast<std::size_t>(x);
-            out[i] = x >= 2 && x + 2 < width
-                         ? tap(in[i - 2], in[i - 1], in[i], in[i + 1], in[i + 2])
-                         : tap(at(x - 2), at(x - 1), at(x), at(x + 1), at(x + 2));
-        }
-    }
-    Image<float> result(width, height);
-    for (int y = 0; y < height; ++y) {
-        std::array<std::span<const float>, 5> in;
-        for (int j = -2; j <= 2; ++j)
-            in[static_cast<std::size_t>(j + 2)] = rows.row(std::clamp(y + j, 0, height - 1));
-        const std::span<float> out = result.row(y);
-        for (std::size_t x = 0; x < out.size(); ++x)
-            out[x] = (in[0][x] + in[4][x] + 4.0f * (in[1][x] + in[3][x]) + 6.0f * in[2][x]) *
-                     (1.0f / 16.0f);
-    }
-    return result;
-}
-
-/// The points of one block with the strongest gradients, `most` at most, in their order.
-void choosePoints(const Image<float>& a,
-                  int block,
-                  int most,
-                  std::vector<RegistrationLevel::Point>& points)
-{
-    const int usable_width = a.width() - 2 * kMargin;
-    const int usable_height = a.height() - 2 * kMargin;
-    const auto edge = [&](int index, int length) {
-        return kMargin + length * index / kBlocksASide;
-    };
-    const int bx = block % kBlocksASide;
-    const int by = block / kBlocksASide;
-    std::vector<RegistrationLevel::Point> here;
-    std::vector<float> strengths;
-    for (int y = edge(by, usable_height); y < edge(by + 1, usable_height); ++y) {
-        for (int x = edge(bx, usable_width); x < edge(bx + 1, usable_width); ++x) {
-            const float gx = 0.5f * (a(x + 1, y) - a(x - 1, y));
-            const float gy = 0.5f * (a(x, y + 1) - a(x, y - 1));
-            const float strength = gx * gx + gy * gy;
-            if (!(strength > 0.0f)) continue;
-            here.push_back({static_cast<float>(x), static_cast<float>(y), a(x, y), gx, gy, block});
-            strengths.push_back(strength);
-        }
-    }
-    float least = 0.0f;
-    if (static_cast<int>(strengths.size()) > most) {
-        const auto rank = strengths.begin() + most;
-        std::nth_element(strengths.begin(), rank, strengths.end(), std::greater<>());
-        least = *rank;
-    }
-    for (const RegistrationLevel::Point& point : here)
-        if (point.gradient_x * point.gradient_x + point.gradient_y * point.gradient_y > least)
-            points.push_back(point);
-}
 
 /// From pixels of a level to coordinates about its centre, unit half diagonal.
 struct Frame {
@@ -228,7 +155,7 @@ public:
         fit.valid = true;
         fit.b_from_a = full_from_level * w * full_from_level.inverse();
         fit.sigma_px = level_.scale * worstCornerSigma();
-        fit.correlation = correlation();
+        fit.correlation = correlation(w);
         return fit;
     }
 
@@ -259,16 +186,16 @@ private:
             return false;
         const auto middle = sizes_.begin() + static_cast<std::ptrdiff_t>(sizes_.size() / 2);
         std::nth_element(sizes_.begin(), middle, sizes_.end());
-        // 1.4826: standard deviation of a normal distribution from its median size; Cauchy's
-        // weights at 2.4 of it keep 95 % of the efficiency.
-        robust_scale_ = std::max(2.4f * 1.4826f * *middle, 0.05f);
+        // 1.4826: standard deviation of a normal distribution from its median size.
+        robust_scale_ = std::max(kRobustSigmas * 1.4826f * *middle, 0.05f);
         return true;
     }
 
     [[nodiscard]] float weightOf(float residual) const
     {
         const float q = residual / robust_scale_;
-        return 1.0f / (1.0f + q * q);
+        const float root = 1.0f / (1.0f + q * q);
+        return root * root;
     }
 
     void accumulate()
@@ -276,23 +203,31 @@ private:
         normal_.setZero();
         score_.setZero();
         block_scores_.assign(static_cast<std::size_t>(level_.blocks), Parameters::Zero());
+        block_information_.assign(static_cast<std::size_t>(level_.blocks), 0.0);
         Eigen::Matrix<float, N, N> block_normal = Eigen::Matrix<float, N, N>::Zero();
         Eigen::Matrix<float, N, 1> block_score = Eigen::Matrix<float, N, 1>::Zero();
+        float weights = 0.0f;
+        float inside = 0.0f;
         for (std::size_t i = 0; i < level_.points.size(); ++i) {
             if (const float r = residuals_[i]; !std::isnan(r)) {
                 const float weight = weightOf(r);
                 block_normal.noalias() += (weight * jacobians_[i]) * jacobians_[i].transpose();
                 block_score.noalias() += weight * r * jacobians_[i];
+                weights += weight;
+                inside += 1.0f;
             }
             const bool block_ends = i + 1 == level_.points.size() ||
                                     level_.points[i + 1].block != level_.points[i].block;
             if (!block_ends) continue;
             const auto block = static_cast<std::size_t>(level_.points[i].block);
-            block_scores_[block] = block_score.template cast<double>();
-            normal_ += block_normal.template cast<double>();
+            const double trust = inside > 0.0f ? weights / inside : 0.0f;
+            block_scores_[block] = trust * trust * block_score.template cast<double>();
+            block_information_[block] = trust * trust * block_normal.trace();
+            normal_ += trust * trust * block_normal.template cast<double>();
             score_ += block_scores_[block];
             block_normal.setZero();
             block_score.setZero();
+            weights = inside = 0.0f;
         }
         // Directions that nothing is known of must not blow up, but stay uncertain.
         normal_.diagonal().array() += 1e-9 * normal_.trace() + 1e-12;
@@ -306,16 +241,19 @@ private:
     [[nodiscard]] double worstCornerSigma() const
     {
         Normal scatter = Normal::Zero();
-        int used = 0;
-        for (const Parameters& score : block_scores_) {
-            if (score.isZero(0.0)) continue;
+        for (const Parameters& score : block_scores_)
             scatter += score * score.transpose();
-            ++used;
+        // Blocks that weigh little hardly count: a picture with one window in it has few blocks.
+        double sum = 0.0;
+        double squares = 0.0;
+        for (const double weight : block_information_) {
+            sum += weight;
+            squares += weight * weight;
         }
-        // As many blocks as parameters tell nothing of the spread.
-        if (used <= N + 1) return std::numeric_limits<double>::infinity();
+        const double blocks = squares > 0.0 ? sum * sum / squares : 0.0;
+        if (blocks < N + 2.0) return std::numeric_limits<double>::infinity();
         const Normal inverse = normal_.inverse();
-        const Normal covariance = inverse * scatter * inverse * used / (used - N);
+        const Normal covariance = inverse * scatter * inverse * blocks / (blocks - N);
         double worst = 0.0;
         for (const double sx : {-1.0, 1.0}) {
             for (const double sy : {-1.0, 1.0}) {
@@ -328,30 +266,29 @@ private:
         return std::sqrt(worst);
     }
 
-    [[nodiscard]] double correlation() const
+    /// Of the gradients, not of the values: the points of a regular pattern's edges are all alike
+    /// in value.
+    [[nodiscard]] double correlation(const Eigen::Matrix3d& w) const
     {
-        double n = 0.0;
-        double sa = 0.0;
-        double sb = 0.0;
         double saa = 0.0;
         double sbb = 0.0;
         double sab = 0.0;
-        for (std::size_t i = 0; i < level_.points.size(); ++i) {
-            if (std::isnan(residuals_[i])) continue;
-            const RegistrationLevel::Point& point = level_.points[i];
-            const double weight =
-                point.gradient_x * point.gradient_x + point.gradient_y * point.gradient_y;
-            const double a = point.value;
-            const double b = point.value + residuals_[i];
-            n += weight;
-            sa += weight * a;
-            sb += weight * b;
-            saa += weight * a * a;
-            sbb += weight * b * b;
-            sab += weight * a * b;
+        for (const RegistrationLevel::Point& point : level_.points) {
+            const Eigen::Vector2d at =
+                (w * Eigen::Vector3d(point.x + 0.5, point.y + 0.5, 1.0)).hnormalized() -
+                Eigen::Vector2d(0.5, 0.5);
+            if (!(at.x() >= 1.0 && at.y() >= 1.0 && at.x() <= level_.b.width() - 2.0 &&
+                  at.y() <= level_.b.height() - 2.0))
+                continue;
+            const double bx = 0.5 * (sampleAt(level_.b, at.x() + 1.0, at.y()) -
+                                     sampleAt(level_.b, at.x() - 1.0, at.y()));
+            const double by = 0.5 * (sampleAt(level_.b, at.x(), at.y() + 1.0) -
+                                     sampleAt(level_.b, at.x(), at.y() - 1.0));
+            saa += point.gradient_x * point.gradient_x + point.gradient_y * point.gradient_y;
+            sbb += bx * bx + by * by;
+            sab += point.gradient_x * bx + point.gradient_y * by;
         }
-        const double variance = (saa - sa * sa / n) * (sbb - sb * sb / n);
-        return variance > 0.0 ? (sab - sa * sb / n) / std::sqrt(variance) : 0.0;
+        return saa * sbb > 0.0 ? sab / std::sqrt(saa * sbb) : 0.0;
     }
 
     const RegistrationLevel& level_;
@@ -363,6 +300,7 @@ private:
     Normal normal_;
     Parameters score_;
     std::vector<Parameters> block_scores_;
+    std::vector<double> block_information_;  ///< trace of each block's part of normal_
 };
 
 }  // namespace
@@ -386,18 +324,6 @@ double cornerDifference(const Eigen::Matrix3d& first,
 double cornerShift(const Eigen::Matrix3d& b_from_a, int width, int height)
 {
     return cornerDifference(b_from_a, Eigen::Matrix3d::Identity(), width, height);
-}
-
-RegistrationLevel makeLevel(const Image<float>& a, const Image<float>& b, double scale)
-{
-    RegistrationLevel level;
-    level.a = smoothed(a);
-    level.b = smoothed(b);
-    level.scale = scale;
-    level.blocks = kBlocksASide * kBlocksASide;
-    for (int block = 0; block < level.blocks; ++block)
-        choosePoints(level.a, block, kMostPoints / level.blocks, level.points);
-    return level;
 }
 
 RegistrationFit fitLevel(const RegistrationLevel& level,

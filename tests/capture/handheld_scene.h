@@ -50,6 +50,7 @@ public:
         glm::dvec3 radiance(0.02, 0.022, 0.02);
         for (const Rectangle& r : rectangles_) {
             const glm::dvec2 d = glm::dvec2(x, y) - r.center;
+            if (std::max(std::abs(d.x), std::abs(d.y)) > r.half.x + r.half.y + 1.0) continue;
             const double u = glm::dot(d, r.across);
             const double v = d.y * r.across.x - d.x * r.across.y;
             // Outlines are soft over about a pixel, as a lens leaves them.
