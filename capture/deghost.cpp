@@ -23,11 +23,8 @@ using Mask = Image<std::uint8_t>;
 /// More than half of a window of this side must disagree for a region to start there: noise alone
 /// never does, and misplaced outlines are thinner.
 constexpr int kWindow = 5;
-/// Another frame takes the place of the reference in a region when its agreement with the others
-/// is greater by this share of all comparisons.
+/// A frame takes another one's place in a region when it agrees with so many more frames, a pixel.
 constexpr double kVoteMargin = 0.05;
-/// A frame that may be believed in a region measures at least this share of it.
-constexpr double kLeastGoodShare = 0.8;
 
 /// The mask's own memory.
 cv::Mat asMat(Mask& mask)
@@ -66,23 +63,24 @@ void keepRegions(Mask& mask, int min_region_px)
             mat.at<std::uint8_t>(y, x) = keep ? 1 : 0;
         }
     }
-    // Holes in a region belong to it: a shirt may have the wall's colour in places.
+}
+
+/// Holes in a region belong to it: a shirt may have the wall's colour in places.
+void fillHoles(Mask& mask)
+{
     const int side = 2 * kWindow + 1;
+    cv::Mat mat = asMat(mask);
     cv::morphologyEx(
         mat, mat, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
 }
 
-/// A connected region that disagrees in some frame.
+/// A connected region in which the believed frame is in doubt.
 using Region = std::vector<glm::ivec2>;
 
-std::vector<Region> regionsOf(const std::vector<Mask>& masks)
+std::vector<Region> regionsOf(Mask& mask)
 {
-    Mask any = masks.front();
-    for (const Mask& mask : masks)
-        for (std::size_t i = 0; i < mask.pixelCount(); ++i)
-            any.pixels()[i] |= mask.pixels()[i];
     cv::Mat labels;
-    const int count = cv::connectedComponents(asMat(any), labels, 8, CV_32S);
+    const int count = cv::connectedComponents(asMat(mask), labels, 8, CV_32S);
     std::vector<Region> regions(static_cast<std::size_t>(count - 1));
     for (int y = 0; y < labels.rows; ++y)
         for (int x = 0; x < labels.cols; ++x)
@@ -109,32 +107,58 @@ public:
     {
         std::vector<Mask> result = disagreement();
         bool changed = false;
-        for (const Region& region : regionsOf(result))
+        Mask doubted = outvoted(result);
+        for (const Region& region : regionsOf(doubted))
             changed = vote(region) || changed;
         if (changed) result = disagreement();
-        for (int k = 0; k < count_; ++k) {
-            Mask& mask = result[static_cast<std::size_t>(k)];
+        for (Mask& mask : result) {
+            fillHoles(mask);
             grow(mask, options_.grow_px);
-            // The frame that is believed stays, so that never the last measurement goes.
-            for (std::size_t i = 0; i < mask.pixelCount(); ++i)
-                if (believed_.pixels()[i] == k) mask.pixels()[i] = 0;
         }
+        keepOne(result);
         return result;
     }
 
 private:
     void believeBestExposed()
     {
-        std::vector<int> order{best_};
-        for (int distance = 1; distance < count_; ++distance)
-            for (const int k : {best_ + distance, best_ - distance})
-                if (k >= 0 && k < count_) order.push_back(k);
+        // Where it is black the frames exposed more come first, else those exposed less.
+        const auto orderFrom = [&](bool longer_first) {
+            std::vector<int> order{best_};
+            for (int distance = 1; distance < count_; ++distance)
+                for (const int sign : {1, -1})
+                    if (const int k = best_ + (longer_first ? -sign : sign) * distance;
+                        k >= 0 && k < count_)
+                        order.push_back(k);
+            return order;
+        };
+        const std::vector<int> when_clipped = orderFrom(false);
+        const std::vector<int> when_black = orderFrom(true);
         parallelFor(0, height_, [&](std::int64_t row) {
             const int y = static_cast<int>(row);
             for (int x = 0; x < width_; ++x) {
+                const std::vector<int>& order =
+                    comparison_.isClipped(best_, x, y) ? when_clipped : when_black;
                 const auto good =
                     std::ranges::find_if(order, [&](int k) { return comparison_.isGood(k, x, y); });
                 believed_(x, y) = good == order.end() ? best_ : *good;
+            }
+        });
+    }
+
+    /// Where growing has left no frame that measures anything, the believed one stays.
+    void keepOne(std::vector<Mask>& masks) const
+    {
+        parallelFor(0, height_, [&](std::int64_t row) {
+            const int y = static_cast<int>(row);
+            for (int x = 0; x < width_; ++x) {
+                Mask& believed = masks[static_cast<std::size_t>(believed_(x, y))];
+                if (believed(x, y) == 0) continue;
+                bool other = false;
+                for (int k = 0; k < count_; ++k)
+                    other = other || (masks[static_cast<std::size_t>(k)](x, y) == 0 &&
+                                      comparison_.isGood(k, x, y));
+                if (!other) believed(x, y) = 0;
             }
         });
     }
@@ -158,44 +182,89 @@ private:
         return masks;
     }
 
-    /// Agreements less disagreements of frame j with the others where both measure, per pixel.
+    /// Where more frames disagree with the believed one than agree: who stood there was in it.
+    [[nodiscard]] Mask outvoted(const std::vector<Mask>& masks) const
+    {
+        Mask result(width_, height_);
+        parallelFor(0, height_, [&](std::int64_t row) {
+            const int y = static_cast<int>(row);
+            for (int x = 0; x < width_; ++x) {
+                int against = 0;
+                int with = 0;
+                for (int k = 0; k < count_; ++k) {
+                    if (k == believed_(x, y)) continue;
+                    if (masks[static_cast<std::size_t>(k)](x, y) != 0)
+                        ++against;
+                    else if (comparison_.isGood(k, x, y))
+                        ++with;
+                }
+                result(x, y) = against >= 2 && against > with ? 1 : 0;
+            }
+        });
+        keepRegions(result, options_.min_region_px);
+        fillHoles(result);
+        return result;
+    }
+
+    /// How well frame j fits the others in a region, per pixel. Where it is clipped, that one
+    /// exposed more is so too is what it foretells; that one exposed less is, agrees but says less.
     [[nodiscard]] double agreementOf(int j, const Region& region) const
     {
-        std::int64_t sum = 0;
+        std::int64_t halves = 0;
         for (const glm::ivec2 p : region) {
-            if (!comparison_.isGood(j, p.x, p.y)) continue;
+            const bool good = comparison_.isGood(j, p.x, p.y);
+            const bool clipped = comparison_.isClipped(j, p.x, p.y);
             for (int k = 0; k < count_; ++k) {
                 if (k == j) continue;
                 if (comparison_.disagree(k, j, p.x, p.y))
-                    --sum;
-                else if (comparison_.isGood(k, p.x, p.y))
-                    ++sum;
+                    halves -= 2;
+                else if (good && comparison_.isGood(k, p.x, p.y))
+                    halves += 2;
+                else if (clipped && comparison_.isClipped(k, p.x, p.y))
+                    halves += k < j ? 2 : 1;
             }
         }
-        return static_cast<double>(sum) / static_cast<double>(region.size());
+        return 0.5 * static_cast<double>(halves) / static_cast<double>(region.size());
     }
 
-    /// Believes another frame in the region if most others do; true when it changes something.
+    /// Does frame j contradict what is believed in most of the region?
+    [[nodiscard]] bool contradicts(int j, const Region& region) const
+    {
+        const auto against = std::ranges::count_if(region, [&](glm::ivec2 p) {
+            return j != believed_(p.x, p.y) &&
+                   comparison_.disagree(j, believed_(p.x, p.y), p.x, p.y);
+        });
+        return 2 * against > static_cast<std::ptrdiff_t>(region.size());
+    }
+
+    /// Believes in the region the frame that fits the others best of those that contradict what is
+    /// believed so far; true when that changes something.
     bool vote(const Region& region)
     {
-        std::vector<double> agreement(static_cast<std::size_t>(count_));
+        constexpr double kOut = -1e9;
+        std::vector<double> agreement(static_cast<std::size_t>(count_), kOut);
         parallelFor(0, count_, [&](std::int64_t j) {
             const auto frame = static_cast<int>(j);
-            const auto good = std::ranges::count_if(
-                region, [&](glm::ivec2 p) { return comparison_.isGood(frame, p.x, p.y); });
-            const bool eligible =
-                static_cast<double>(good) >= kLeastGoodShare * static_cast<double>(region.size());
-            agreement[static_cast<std::size_t>(j)] =
-                eligible ? agreementOf(frame, region) : -static_cast<double>(count_);
+            if (contradicts(frame, region))
+                agreement[static_cast<std::size_t>(j)] = agreementOf(frame, region);
         });
-        const auto winner = std::ranges::max_element(agreement);
-        const double margin = kVoteMargin * (count_ - 1);
-        const auto best = static_cast<std::size_t>(best_);
-        if (*winner <= -count_ || *winner < agreement[best] + margin) return false;
-        const auto frame = static_cast<int>(winner - agreement.begin());
-        for (const glm::ivec2 p : region)
-            if (comparison_.isGood(frame, p.x, p.y)) believed_(p.x, p.y) = frame;
-        return true;
+        int winner = 0;
+        for (int k = 1; k < count_; ++k)
+            if (agreement[static_cast<std::size_t>(k)] >
+                agreement[static_cast<std::size_t>(winner)] + kVoteMargin)
+                winner = k;
+        if (agreement[static_cast<std::size_t>(winner)] == kOut) return false;
+        bool changed = false;
+        const int r = options_.grow_px;
+        for (const glm::ivec2 p : region) {
+            for (int y = std::max(p.y - r, 0); y <= std::min(p.y + r, height_ - 1); ++y) {
+                for (int x = std::max(p.x - r, 0); x <= std::min(p.x + r, width_ - 1); ++x) {
+                    changed = changed || believed_(x, y) != winner;
+                    believed_(x, y) = winner;
+                }
+            }
+        }
+        return changed;
     }
 
     DeghostOptions options_;

@@ -13,6 +13,9 @@ namespace {
 /// On 255: codes below the first count as black, above the second one as clipped.
 constexpr float kBlackCode = 6.0f;
 constexpr float kClipCode = 248.0f;
+/// A pixel measures something when its brightest channel is at least this, in the mean of 3 x 3.
+constexpr float kLeastGoodCode = 16.0f;
+constexpr float kDoubtfulCode = 210.0f;
 /// Pixels looked at for the noise of a pair of frames, about.
 constexpr double kNoiseSamples = 60'000.0;
 /// A bin with fewer takes the noise of the whole range.
@@ -25,6 +28,12 @@ float lookUp(const std::array<float, 256>& table, float code)
     const float z = std::clamp(code, 0.0f, 255.0f);
     const auto low = std::min<std::size_t>(static_cast<std::size_t>(z), 254);
     return table[low] + (z - static_cast<float>(low)) * (table[low + 1] - table[low]);
+}
+
+/// Beside a clipped channel another high one may be off: JPEG shares colour between neighbours.
+bool isDoubtful(float code, float brightest)
+{
+    return brightest > kClipCode && code <= kClipCode && code > kDoubtfulCode;
 }
 
 float medianOf(std::vector<float>& values)
@@ -76,6 +85,15 @@ FrameComparison::FrameComparison(const Bracket& bracket,
                 static_cast<float>(std::max({more, less, 1.0}));
         }
     }
+    const int width = bracket.frames.front().image.codes.width();
+    const int height = bracket.frames.front().image.codes.height();
+    states_.assign(static_cast<std::size_t>(count_), Image<State>(width, height));
+    parallelFor(0, height, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int k = 0; k < count_; ++k)
+            for (int x = 0; x < width; ++x)
+                states_[static_cast<std::size_t>(k)](x, y) = measureState(k, x, y);
+    });
     tables_.resize(static_cast<std::size_t>(count_ * count_));
     parallelFor(0, static_cast<std::int64_t>(count_) * count_, [&](std::int64_t i) {
         const int k = static_cast<int>(i) / count_;
@@ -91,19 +109,27 @@ float FrameComparison::codeOn255(int frame, int x, int y, int channel) const
            static_cast<float>(image.max_code);
 }
 
-bool FrameComparison::isExcluded(int frame, int x, int y) const
+float FrameComparison::brightestOf(int frame, int x, int y) const
 {
-    const Image<std::uint8_t>& mask = bracket_.frames[static_cast<std::size_t>(frame)].excluded;
-    return !mask.empty() && mask(x, y) != 0;
+    return std::max(
+        {codeOn255(frame, x, y, 0), codeOn255(frame, x, y, 1), codeOn255(frame, x, y, 2)});
 }
 
-bool FrameComparison::isGood(int frame, int x, int y) const
+FrameComparison::State FrameComparison::measureState(int frame, int x, int y) const
 {
-    if (isExcluded(frame, x, y)) return false;
-    float brightest = 0.0f;
-    for (int c = 0; c < 3; ++c)
-        brightest = std::max(brightest, codeOn255(frame, x, y, c));
-    return brightest >= 2.0f * kBlackCode && brightest <= kClipCode;
+    const BracketFrame& source = bracket_.frames[static_cast<std::size_t>(frame)];
+    if (!source.excluded.empty() && source.excluded(x, y) != 0) return State::Excluded;
+    if (brightestOf(frame, x, y) > kClipCode) return State::Clipped;
+    float sum = 0.0f;
+    float count = 0.0f;
+    const Image<glm::u16vec3>& codes = source.image.codes;
+    for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, codes.height() - 1); ++ny) {
+        for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, codes.width() - 1); ++nx) {
+            sum += brightestOf(frame, nx, ny);
+            count += 1.0f;
+        }
+    }
+    return sum >= kLeastGoodCode * count ? State::Good : State::Black;
 }
 
 FrameComparison::PairTables FrameComparison::measurePair(int k, int j) const
@@ -131,7 +157,8 @@ void FrameComparison::measureNoise(int k, int j, int channel, Table& table) cons
     std::vector<float> all;
     for (int y = step / 2; y < height; y += step) {
         for (int x = step / 2; x < width; x += step) {
-            if (!isGood(k, x, y) || !isGood(j, x, y)) continue;
+            // Where k is clipped counts as well: without, only its darker deviations would be seen.
+            if (isExcluded(k, x, y) || !isGood(j, x, y)) continue;
             const float code = codeOn255(j, x, y, channel);
             const float other = codeOn255(k, x, y, channel);
             const float predicted = lookUp(table.predicted, code);
@@ -160,9 +187,7 @@ FrameComparison::Range FrameComparison::predictedRange(
     int k, int j, int x, int y, int channel) const
 {
     const Table& tables = table(k, j, channel);
-    float brightest = 0.0f;
-    for (int c = 0; c < 3; ++c)
-        brightest = std::max(brightest, codeOn255(j, x, y, c));
+    const float brightest = brightestOf(j, x, y);
     const float code = codeOn255(j, x, y, channel);
     const auto limit = [&](float z, float sign) {
         const float predicted = lookUp(tables.predicted, z);
@@ -171,9 +196,8 @@ FrameComparison::Range FrameComparison::predictedRange(
     };
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     Range range{limit(code, -1.0f), limit(code, 1.0f)};
-    // Beside a clipped channel the others may be off as well (JPEG shares colour): bounds only.
-    if (brightest > kClipCode) range.high = kInfinity;
-    if (brightest > kClipCode && code <= kClipCode) range.low = -kInfinity;
+    if (code > kClipCode || isDoubtful(code, brightest)) range.high = kInfinity;
+    if (isDoubtful(code, brightest)) range.low = -kInfinity;
     if (code < kBlackCode) range = {-kInfinity, limit(kBlackCode, 1.0f)};
     return range;
 }
@@ -181,16 +205,14 @@ FrameComparison::Range FrameComparison::predictedRange(
 bool FrameComparison::disagree(int k, int j, int x, int y) const
 {
     if (isExcluded(k, x, y) || isExcluded(j, x, y)) return false;
-    float brightest = 0.0f;
-    for (int c = 0; c < 3; ++c)
-        brightest = std::max(brightest, codeOn255(k, x, y, c));
+    const float brightest = brightestOf(k, x, y);
     const int width = bracket_.frames.front().image.codes.width();
     const int height = bracket_.frames.front().image.codes.height();
     for (int c = 0; c < 3; ++c) {
         const float code = codeOn255(k, x, y, c);
-        if (brightest > kClipCode && code <= kClipCode) continue;
+        if (isDoubtful(code, brightest)) continue;
         constexpr float kInfinity = std::numeric_limits<float>::infinity();
-        const Range own{code < kBlackCode ? -kInfinity : code,
+        const Range own{code < kBlackCode ? -kInfinity : std::min(code, kClipCode),
                         code > kClipCode ? kInfinity : std::max(code, kBlackCode)};
         const auto meets = [&](const Range& range) {
             return range.low <= own.high && own.low <= range.high;

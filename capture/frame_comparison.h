@@ -5,6 +5,7 @@
 #include "core/response_curve.h"
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 namespace insitu::detail {
@@ -23,12 +24,21 @@ public:
                     const ResponseCurve& response,
                     const DeghostOptions& options);
 
-    /// Neither clipped nor wholly black nor excluded: a measurement of radiance.
-    [[nodiscard]] bool isGood(int frame, int x, int y) const;
+    /// Neither clipped nor black (with its surroundings: noise must not decide) nor excluded: a
+    /// measurement of radiance.
+    [[nodiscard]] bool isGood(int frame, int x, int y) const
+    {
+        return states_[static_cast<std::size_t>(frame)](x, y) == State::Good;
+    }
+    [[nodiscard]] bool isClipped(int frame, int x, int y) const
+    {
+        return states_[static_cast<std::size_t>(frame)](x, y) == State::Clipped;
+    }
     /// Frames `k` and `j` cannot show the same here; false where one of them is excluded.
     [[nodiscard]] bool disagree(int k, int j, int x, int y) const;
 
 private:
+    enum class State : std::uint8_t { Good, Clipped, Black, Excluded };
     static constexpr int kBins = 16;
     /// For one channel of an ordered pair of frames: everything by code on 255.
     struct Table {
@@ -45,7 +55,12 @@ private:
     [[nodiscard]] PairTables measurePair(int k, int j) const;
     void measureNoise(int k, int j, int channel, Table& table) const;
     [[nodiscard]] float codeOn255(int frame, int x, int y, int channel) const;
-    [[nodiscard]] bool isExcluded(int frame, int x, int y) const;
+    [[nodiscard]] float brightestOf(int frame, int x, int y) const;
+    [[nodiscard]] State measureState(int frame, int x, int y) const;
+    [[nodiscard]] bool isExcluded(int frame, int x, int y) const
+    {
+        return states_[static_cast<std::size_t>(frame)](x, y) == State::Excluded;
+    }
     [[nodiscard]] Range predictedRange(int k, int j, int x, int y, int channel) const;
     [[nodiscard]] float slackAt(const Table& table, int channel, float code) const;
     [[nodiscard]] const Table& table(int k, int j, int channel) const
@@ -58,7 +73,8 @@ private:
     DeghostOptions options_;
     int count_;
     std::array<std::array<float, 256>, 3> tolerance_;  ///< in codes, by channel and code
-    std::vector<PairTables> tables_;                   ///< [k * count + j]
+    std::vector<Image<State>> states_;
+    std::vector<PairTables> tables_;  ///< [k * count + j]
 };
 
 }  // namespace insitu::detail

@@ -7,6 +7,7 @@
 #include "tests/capture/handheld_scene.h"
 #include "tests/support/tolerance.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,7 +86,8 @@ double share(const std::vector<Image<std::uint8_t>>& masks)
     return static_cast<double>(any) / static_cast<double>(masks.front().pixelCount());
 }
 
-/// The plainest merge there is: hats about the middle of the codes. With masks or without.
+/// The plainest merge there is: hats about the middle of the codes times the exposure. With masks
+/// or without.
 Image<Rgb> mergePlainly(const Bracket& bracket,
                         const ResponseCurve& response,
                         const std::vector<Image<std::uint8_t>>& masks)
@@ -100,10 +102,10 @@ Image<Rgb> mergePlainly(const Bracket& bracket,
                     if (!masks.empty() && masks[k](x, y) != 0) continue;
                     const glm::u16vec3 codes = bracket.frames[k].image.codes(x, y);
                     const double code = codes[c];
-                    const double weight =
-                        std::max({codes.r, codes.g, codes.b}) > 248
-                            ? 1e-9
-                            : std::max(1e-6, 1.0 - std::abs(code - 127.5) / 127.5);
+                    const double hat = std::max(1e-6, 1.0 - std::abs(code - 127.5) / 127.5);
+                    const double weight = std::max({codes.r, codes.g, codes.b}) > 248
+                                              ? 1e-9
+                                              : hat * bracket.frames[k].relative_exposure;
                     sum += weight * response.decode(c, code) / bracket.frames[k].relative_exposure;
                     weights += weight;
                 }
@@ -167,6 +169,7 @@ struct Passer {
     int count;
     double ev_step;
     std::uint64_t seed;
+    double most_added = 0.35;  ///< share of the leak that may stay
 };
 
 class SomethingMoves : public testing::TestWithParam<Passer> {};
@@ -187,12 +190,13 @@ TEST_P(SomethingMoves, DoesNotLeakIntoTheRadiance)
     const double best = leakOf(still.bracket, {});
     const double with = leakOf(scene.bracket, moved.masks);
     const double without = leakOf(scene.bracket, {});
-    std::printf("leak %s: %.3f without masks, %.3f with, %.3f when nothing moves\n",
-                passer.name,
-                without,
-                with,
-                best);
-    EXPECT_LT(with, 0.25 * without);
+    SCOPED_TRACE(fmt::format(
+        "leak {:.3f} without masks, {:.3f} with, {:.3f} when nothing moves", without, with, best));
+    // What moved adds to the noise that is there anyway, in squares.
+    const auto added = [&](double error) {
+        return std::sqrt(std::max(error * error - best * best, 0.0));
+    };
+    EXPECT_LT(added(with), passer.most_added * added(without));
     EXPECT_LT(with, best + 0.05);
     EXPECT_TRUE(hasFinding(moved.findings, "bracket-ghosts-removed"));
     EXPECT_NEAR(moved.moved_fraction, share(moved.masks), tolerance::kDouble);
@@ -202,7 +206,8 @@ INSTANTIATE_TEST_SUITE_P(
     Deghost,
     SomethingMoves,
     testing::Values(Passer{"disc", crossingDisc, Rgb(0.3f, 0.25f, 0.2f), 5, 2.0, 5},
-                    Passer{"dark disc", crossingDisc, Rgb(0.001f), 5, 1.5, 6},
+                    // Half of its places are before a wall nearly as dark: within noise.
+                    Passer{"dark disc", crossingDisc, Rgb(0.001f), 5, 1.5, 6, 0.6},
                     Passer{"person", walkingPerson, Rgb(0.12f, 0.05f, 0.03f), 5, 1.5, 7},
                     Passer{"dark person", walkingPerson, Rgb(0.002f), 3, 2.0, 8}),
     [](const auto& passer) {
@@ -214,9 +219,17 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Deghost, TheMasksHoldWhatMoved)
 {
     const Captured scene = capture(5, 1.5, 7, walkingPerson, Rgb(0.12f, 0.05f, 0.03f));
+    const Captured still = capture(5, 1.5, 7, nullptr, Rgb(0.0f));
     const MovedPixels moved = findMovedPixels(scene.bracket, scene.response);
+    // Who stands before a wall that looks the same in this frame cannot be seen, and does no harm.
+    const auto differs = [&](std::size_t k, int x, int y) {
+        const glm::ivec3 a(scene.bracket.frames[k].image.codes(x, y));
+        const glm::ivec3 b(still.bracket.frames[k].image.codes(x, y));
+        return std::max({std::abs(a.x - b.x), std::abs(a.y - b.y), std::abs(a.z - b.z)}) > 30;
+    };
     for (int k = 0; k < 5; ++k) {
         int inside = 0;
+        int visible = 0;
         int found = 0;
         int outside = 0;
         for (int y = 0; y < kHeight; ++y) {
@@ -224,17 +237,19 @@ TEST(Deghost, TheMasksHoldWhatMoved)
                 const bool masked = moved.masks[static_cast<std::size_t>(k)](x, y) != 0;
                 const bool person = walkingPerson(k, x + 0.5, y + 0.5);
                 inside += person ? 1 : 0;
-                found += person && masked ? 1 : 0;
+                const bool seen = person && differs(static_cast<std::size_t>(k), x, y);
+                visible += seen ? 1 : 0;
+                found += seen && masked ? 1 : 0;
                 outside += !person && masked ? 1 : 0;
             }
         }
-        // A person before a wall of the same radiance cannot be seen, and does no harm.
-        EXPECT_GT(found, 0.75 * inside) << "frame " << k;
+        // Far longer exposures than the believed one are held against its amplified noise.
+        EXPECT_GT(found, (k == 0 ? 0.6 : 0.9) * visible) << "frame " << k;
         EXPECT_LT(outside, 0.8 * inside) << "frame " << k;
     }
 }
 
-TEST(Deghost, WhatHidesALampInALongFrameIsFound)
+TEST(Deghost, WhatHidesALampInTheShortestFrameIsFound)
 {
     // A lamp that clips the best exposed frame; in the shortest one something stands before it.
     const Silhouette hand = [](int k, double x, double y) {
