@@ -16,6 +16,9 @@ constexpr float kClipCode = 248.0f;
 /// A pixel measures something when its brightest channel is at least this, in the mean of 3 x 3.
 constexpr float kLeastGoodCode = 16.0f;
 constexpr float kDoubtfulCode = 210.0f;
+/// The medians of a bin may be off by this share of the exposure, from a response curve or an
+/// exposure time that is not quite right; more is something that moved.
+constexpr double kMostBias = 0.4;
 /// Pixels looked at for the noise of a pair of frames, about.
 constexpr double kNoiseSamples = 60'000.0;
 /// A bin with fewer takes the noise of the whole range.
@@ -58,6 +61,16 @@ Spread spreadOf(std::vector<float> values)
         value = std::abs(value - spread.middle);
     spread.sigma = std::max(1.4826f * medianOf(values), kLeastSigma);
     return spread;
+}
+
+/// A value between the middles of bins.
+template <std::size_t Bins>
+float betweenBins(const std::array<float, Bins>& values, float code)
+{
+    const float place =
+        std::clamp(code * static_cast<float>(Bins) / 256.0f - 0.5f, 0.0f, Bins - 1.0f);
+    const auto low = std::min(static_cast<std::size_t>(place), Bins - 2);
+    return values[low] + (place - static_cast<float>(low)) * (values[low + 1] - values[low]);
 }
 
 std::size_t binOf(float code, int bins)
@@ -170,16 +183,20 @@ void FrameComparison::measureNoise(int k, int j, int channel, Table& table) cons
     const Spread whole = spreadOf(std::move(all));
     for (std::size_t b = 0; b < bins.size(); ++b) {
         const Spread spread = bins[b].size() >= kLeastInBin ? spreadOf(std::move(bins[b])) : whole;
-        const auto middle = (static_cast<float>(b) + 0.5f) * 256.0f / kBins;
-        const float most = lookUp(tolerance_[static_cast<std::size_t>(channel)], middle);
-        table.bias[b] = std::clamp(spread.middle, -most, most);
+        const double middle = (static_cast<double>(b) + 0.5) * 256.0 / kBins;
+        const double exposure = response_.decode(channel, middle);
+        const auto least =
+            static_cast<float>(response_.encode(channel, exposure * (1.0 - kMostBias)) - middle);
+        const auto most =
+            static_cast<float>(response_.encode(channel, exposure * (1.0 + kMostBias)) - middle);
+        table.bias[b] = std::clamp(spread.middle, std::min(least, 0.0f), std::max(most, 0.0f));
         table.slack[b] = static_cast<float>(options_.sigmas) * spread.sigma;
     }
 }
 
 float FrameComparison::slackAt(const Table& table, int channel, float code) const
 {
-    return std::max(table.slack[binOf(code, kBins)],
+    return std::max(betweenBins(table.slack, code),
                     lookUp(tolerance_[static_cast<std::size_t>(channel)], code));
 }
 
@@ -191,7 +208,7 @@ FrameComparison::Range FrameComparison::predictedRange(
     const float code = codeOn255(j, x, y, channel);
     const auto limit = [&](float z, float sign) {
         const float predicted = lookUp(tables.predicted, z);
-        return predicted + tables.bias[binOf(predicted, kBins)] +
+        return predicted + betweenBins(tables.bias, predicted) +
                sign * slackAt(tables, channel, predicted);
     };
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
