@@ -17,7 +17,7 @@ struct BracketFrame {
     double relative_exposure = 0.0;  ///< Exposure::relative(), > 0
     /// Empty: every pixel may be used. Else of the image's size, 1 = this pixel must not be used
     /// (outside the picture after alignment, or something moved there).
-    Image<std::uint8_t> excluded;
+    Image<std::uint8_t> excluded = {};
 };
 
 /// Exposures of one scene from one place: equal sizes, sorted from longest to shortest exposure.
