@@ -6,6 +6,8 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
+
 namespace insitu {
 namespace {
 
@@ -45,6 +47,14 @@ BracketFrame frameOf(std::initializer_list<int> codes, double exposure, int max_
     return frame;
 }
 
+std::vector<std::string> codesOf(const Findings& findings)
+{
+    std::vector<std::string> codes;
+    for (const Finding& finding : findings)
+        codes.push_back(finding.code);
+    return codes;
+}
+
 TEST(MergeBracket, ReturnsTheSceneWhenNothingIsLost)
 {
     const Image<Rgb> scene = tiles(64, 48, 8, 0.02, 50.0);
@@ -52,7 +62,7 @@ TEST(MergeBracket, ReturnsTheSceneWhenNothingIsLost)
     const Bracket bracket = photograph(scene, {1.0, 0.25, 1.0 / 16, 1.0 / 64}, camera);
     const MergeResult merged = mergeBracket(bracket, tableOf(camera), {});
     EXPECT_EQ(merged.clipped_fraction, 0.0);
-    EXPECT_TRUE(merged.findings.empty());
+    EXPECT_THAT(codesOf(merged.findings), testing::ElementsAre("noise-model-assumed"));
     for (std::size_t i = 0; i < scene.pixelCount(); ++i) {
         for (int c = 0; c < 3; ++c) {
             const float truth = scene.pixels()[i][c];
@@ -84,6 +94,11 @@ TEST(MergeBracket, ClippedEverywhereIsTheShortestAndALowerBound)
     const MergeResult merged = mergeBracket(bracket, squares(), {});
     EXPECT_EQ(merged.clipped(0, 0), 1);
     EXPECT_EQ(merged.clipped(3, 0), 0);
+    EXPECT_EQ(merged.validity(0, 0), kMergeClipped);
+    EXPECT_FLOAT_EQ(merged.variance(0, 0).g, std::pow(252.0f * 252.0f / 65536.0f, 2.0f));
+    // Beside it, no frame is clear: believed, and said so. Two pixels away one is.
+    EXPECT_EQ(merged.validity(1, 0), kMergeUnconfirmed);
+    EXPECT_EQ(merged.validity(2, 0), 0);
     EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 252.0f * 252.0f / 65536.0f);
     EXPECT_DOUBLE_EQ(merged.clipped_fraction, 0.25);
     EXPECT_TRUE(hasFinding(merged.findings, "merge-clipped"));
@@ -94,7 +109,9 @@ TEST(MergeBracket, BlackEverywhereIsTheLongest)
     const Bracket bracket = makeBracket({frameOf({3, 128}, 4.0), frameOf({2, 64}, 1.0)});
     const MergeResult merged = mergeBracket(bracket, squares(), {});
     EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 9.0f / 65536.0f / 4.0f);
-    EXPECT_TRUE(merged.findings.empty());
+    EXPECT_EQ(merged.validity(0, 0), kMergeBlack | kMergeSingleFrame);
+    EXPECT_EQ(merged.validity(1, 0), 0);
+    EXPECT_THAT(codesOf(merged.findings), testing::ElementsAre("noise-model-assumed"));
 }
 
 // A gap in the bracket: too bright for the long frame, black in the short one. Black is an upper
@@ -184,12 +201,164 @@ TEST(MergeBracket, DoesNotDependOnTheNumberOfThreads)
     SyntheticCamera camera = plainCamera(255);
     camera.shot_variance = 2.5e-4;
     const Bracket bracket = photograph(tiles(64, 48, 8, 0.02, 50.0), {1.0, 0.25, 1.0 / 16}, camera);
+    std::vector<Image<std::uint8_t>> masks(3, Image<std::uint8_t>(64, 48));
+    for (int y = 10; y < 40; ++y)
+        masks[1](y, y) = 1;
     setThreadCount(1);
-    const MergeResult one = mergeBracket(bracket, tableOf(camera), {});
+    const MergeResult one = mergeBracket(bracket, tableOf(camera), {}, &masks);
     setThreadCount(4);
-    const MergeResult four = mergeBracket(bracket, tableOf(camera), {});
+    const MergeResult four = mergeBracket(bracket, tableOf(camera), {}, &masks);
     setThreadCount(0);
     EXPECT_EQ(one.radiance.pixels, four.radiance.pixels);
+    EXPECT_EQ(one.variance, four.variance);
+    EXPECT_EQ(one.validity, four.validity);
+}
+
+/// Pixels within float rounding of each other.
+void expectSame(const MergeResult& a, const MergeResult& b)
+{
+    ASSERT_TRUE(a.radiance.pixels.sameSize(b.radiance.pixels));
+    for (std::size_t i = 0; i < a.radiance.pixels.pixelCount(); ++i) {
+        for (int c = 0; c < 3; ++c) {
+            const float radiance = a.radiance.pixels.pixels()[i][c];
+            const float variance = a.variance.pixels()[i][c];
+            EXPECT_NEAR(b.radiance.pixels.pixels()[i][c], radiance, tolerance::kFloat * radiance);
+            EXPECT_NEAR(b.variance.pixels()[i][c], variance, tolerance::kFloat * variance) << i;
+        }
+    }
+}
+
+/// Four frames of tiles from black to clipped, and the same bracket without frame `without`.
+struct Exclusion {
+    Bracket all;
+    Bracket rest;
+    ResponseCurve response;
+    MergeOptions options;
+
+    explicit Exclusion(std::size_t without)
+    {
+        SyntheticCamera camera = plainCamera(255);
+        camera.shot_variance = 2.5e-4;
+        response = tableOf(camera);
+        options.noise = assumedNoise(response, 800.0, 255);
+        all = photograph(tiles(64, 48, 8, 0.02, 50.0), {1.0, 0.25, 1.0 / 16, 1.0 / 64}, camera);
+        rest = all;
+        rest.frames.erase(rest.frames.begin() + static_cast<std::ptrdiff_t>(without));
+    }
+};
+
+TEST(MergeBracket, ExcludedPixelsAreAsIfTheFrameWereNotThere)
+{
+    for (const std::size_t without : {0u, 1u, 3u}) {
+        const Exclusion given(without);
+        std::vector<Image<std::uint8_t>> masks(4);
+        masks[without] = Image<std::uint8_t>(64, 48, 1);
+        const MergeResult merged = mergeBracket(given.all, given.response, given.options, &masks);
+        expectSame(merged, mergeBracket(given.rest, given.response, given.options));
+        for (const std::uint8_t flags : merged.validity.pixels())
+            EXPECT_TRUE(flags & kMergeExcluded);
+    }
+}
+
+TEST(MergeBracket, ExcludesOnlyWhereTheMaskSaysSo)
+{
+    const Exclusion given(1);
+    std::vector<Image<std::uint8_t>> masks(4);
+    masks[1] = Image<std::uint8_t>(64, 48);
+    masks[1](20, 30) = 1;
+    const MergeResult plain = mergeBracket(given.all, given.response, given.options);
+    MergeResult merged = mergeBracket(given.all, given.response, given.options, &masks);
+    EXPECT_EQ(merged.validity(20, 30), plain.validity(20, 30) | kMergeExcluded);
+    EXPECT_NE(merged.radiance.pixels(20, 30), plain.radiance.pixels(20, 30));
+    merged.radiance.pixels(20, 30) = plain.radiance.pixels(20, 30);
+    EXPECT_EQ(merged.radiance.pixels, plain.radiance.pixels);
+}
+
+TEST(MergeBracket, MasksOfEveryFrameAreNotFollowed)
+{
+    const Exclusion given(1);
+    const std::vector<Image<std::uint8_t>> masks(4, Image<std::uint8_t>(64, 48, 1));
+    expectSame(mergeBracket(given.all, given.response, given.options, &masks),
+               mergeBracket(given.all, given.response, given.options));
+}
+
+TEST(MergeBracket, MasksMustFit)
+{
+    const Exclusion given(1);
+    const std::vector<Image<std::uint8_t>> few(3);
+    EXPECT_THROW((void)mergeBracket(given.all, given.response, given.options, &few), LogicError);
+    const std::vector<Image<std::uint8_t>> small(4, Image<std::uint8_t>(9, 9));
+    EXPECT_THROW((void)mergeBracket(given.all, given.response, given.options, &small), LogicError);
+}
+
+TEST(MergeBracket, WhiteAndBlackFramesAddNothingAndAreNamed)
+{
+    const Exclusion given(0);
+    Bracket bracket = given.all;
+    const auto frameLike = [&](int code, double exposure, const char* name) {
+        BracketFrame frame = bracket.frames.front();
+        frame.name = name;
+        frame.relative_exposure = exposure;
+        frame.image.codes =
+            Image<glm::u16vec3>(64, 48, glm::u16vec3(static_cast<std::uint16_t>(code)));
+        return frame;
+    };
+    bracket.frames.insert(bracket.frames.begin(), frameLike(255, 1000.0, "white"));
+    bracket.frames.push_back(frameLike(0, 1e-6, "black"));
+    const MergeResult merged = mergeBracket(bracket, given.response, given.options);
+    ASSERT_TRUE(hasFinding(merged.findings, "merge-useless-exposure"));
+    EXPECT_THAT(merged.findings.back().message, testing::HasSubstr("everywhere: white; black: "));
+    expectSame(merged, mergeBracket(given.all, given.response, given.options));
+    EXPECT_FALSE(hasFinding(mergeBracket(given.all, given.response, given.options).findings,
+                            "merge-useless-exposure"));
+}
+
+TEST(MergeBracket, AChannelWithoutLightIsZero)
+{
+    Image<Rgb> scene = tiles(64, 48, 8, 0.02, 5.0);
+    for (Rgb& pixel : scene.pixels())
+        pixel.b = 0.0f;
+    const SyntheticCamera camera = plainCamera(255);
+    const MergeResult merged =
+        mergeBracket(photograph(scene, {1.0, 0.25, 1.0 / 16}, camera), tableOf(camera), {});
+    for (std::size_t i = 0; i < scene.pixelCount(); ++i) {
+        EXPECT_NEAR(merged.radiance.pixels.pixels()[i].b, 0.0f, 1e-6f);
+        EXPECT_GT(merged.variance.pixels()[i].b, 0.0f);
+        EXPECT_FALSE(merged.validity.pixels()[i] & kMergeBlack);  // the others are not
+    }
+}
+
+TEST(MergeBracket, TakesALinearResponse)
+{
+    SyntheticCamera camera = plainCamera(65535);
+    camera.curve = [](int, double e) { return e; };
+    const Image<Rgb> scene = tiles(64, 48, 8, 0.1, 50.0);
+    const MergeResult merged = mergeBracket(
+        photograph(scene, {1.0, 0.25, 1.0 / 16, 1.0 / 64}, camera), tableOf(camera), {});
+    for (std::size_t i = 0; i < scene.pixelCount(); ++i)
+        EXPECT_NEAR(merged.radiance.pixels.pixels()[i].g,
+                    scene.pixels()[i].g,
+                    1e-4f * scene.pixels()[i].g);  // half a 16-bit code at codes above 5000
+}
+
+TEST(MergeBracket, MixesEightAndSixteenBits)
+{
+    const Bracket bracket =
+        makeBracket({frameOf({64}, 0.5, 255), frameOf({32 * 257}, 0.125, 65535)});
+    const MergeResult merged = mergeBracket(bracket, squares(), {});
+    EXPECT_NEAR(merged.radiance.pixels(0, 0).g, 64.0 * 64.0 / 65536.0 / 0.5, 1e-7);
+}
+
+TEST(MergeBracket, UsesTheNoiseItIsGiven)
+{
+    const Bracket bracket = makeBracket({frameOf({64}, 0.5)});
+    MergeOptions options;
+    options.noise = NoiseModel{};
+    options.noise->channels[1] = {0.0, 1e-3, 1e-9, 0.0};
+    const MergeResult merged = mergeBracket(bracket, squares(), options);
+    EXPECT_NEAR(merged.variance(0, 0).g, 1e-3 * 4096.0 / 65536.0 / 0.25, 1e-9);
+    EXPECT_EQ(merged.noise.channels[1].gain, 1e-3);
+    EXPECT_FALSE(hasFinding(merged.findings, "noise-model-assumed"));
 }
 
 TEST(MergeBracket, RefusesBadOptions)
@@ -200,6 +369,21 @@ TEST(MergeBracket, RefusesBadOptions)
     EXPECT_EQ(options.validate().size(), 2u);
     EXPECT_THROW((void)mergeBracket(makeBracket({frameOf({9}, 1.0)}), squares(), options),
                  InputError);
+}
+
+TEST(MergeBracket, RefusesAResponseThatIsNone)
+{
+    const Bracket bracket = makeBracket({frameOf({9}, 1.0)});
+    ResponseCurve flat = squares();
+    flat.exposure[1][100] = flat.exposure[1][99];
+    EXPECT_THROW((void)mergeBracket(bracket, flat, {}), InputError);
+    ResponseCurve endless = squares();
+    endless.exposure[2][255] = std::numeric_limits<double>::infinity();
+    EXPECT_THROW((void)mergeBracket(bracket, endless, {}), InputError);
+    MergeOptions options;
+    options.noise = NoiseModel{};
+    options.noise->channels[0].code_variance = 0.0;
+    EXPECT_THROW((void)mergeBracket(bracket, squares(), options), InputError);
 }
 
 }  // namespace
