@@ -3,6 +3,11 @@
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 
+#include <algorithm>
+#include <cctype>
+#include <string>
+#include <vector>
+
 namespace insitu::cli {
 
 namespace {
@@ -13,6 +18,32 @@ struct MergeArguments {
     std::filesystem::path save_response;
 };
 
+bool isExr(const std::filesystem::path& path)
+{
+    std::string extension = path.extension().string();
+    std::ranges::transform(extension, extension.begin(), [](unsigned char c) {
+        return static_cast<char>(std::tolower(c));
+    });
+    return extension == ".exr";
+}
+
+/// OpenEXR holds what the other formats have no place for: variance and validity.
+void writeMerged(const std::filesystem::path& path, const MergeResult& merged)
+{
+    if (!isExr(path)) {
+        writeRadiance(path, merged.radiance.pixels);
+        return;
+    }
+    std::vector<ExrChannel> channels;
+    addColorLayer(channels, "", merged.radiance.pixels);
+    addColorLayer(channels, "variance", merged.variance);
+    ExrChannel validity{"validity",
+                        Image<float>(merged.validity.width(), merged.validity.height())};
+    std::ranges::copy(merged.validity.pixels(), validity.values.pixels().begin());
+    channels.push_back(std::move(validity));
+    writeLayeredExr(path, channels);
+}
+
 void runMerge(const MergeArguments& arguments, Context& context)
 {
     context.start();
@@ -21,7 +52,7 @@ void runMerge(const MergeArguments& arguments, Context& context)
     if (!isRadianceFile(arguments.output))
         throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
     const BracketRadiance result = mergeArguments(arguments.bracket, context);
-    writeRadiance(arguments.output, result.merged.radiance.pixels);
+    writeMerged(arguments.output, result.merged);
     if (!arguments.save_response.empty())
         writeJson(arguments.save_response, toJson(result.response));
 }
@@ -41,6 +72,11 @@ void registerMerge(CLI::App& app, Context& context)
         "--save-response", arguments->save_response, "Write the response curve (.json)");
     context.addCommonOptions(*command);
     command->footer(
+        "An .exr also holds the layers variance.R, .G, .B (of the radiance, per pixel) and "
+        "validity\n"
+        "(bits: 1 clipped, 2 black, 4 a single frame, 8 something excluded, 16 beside clipped "
+        "pixels\n"
+        "in every frame).\n"
         "Examples:\n"
         "  insitu merge IMG_1.jpg IMG_2.jpg IMG_3.jpg -o room.exr --save-response camera.json\n"
         "  insitu merge a.png b.png --exposures 1/60,1/15 --response camera.json -o room.exr");

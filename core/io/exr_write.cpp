@@ -87,6 +87,20 @@ void writeExr(const std::filesystem::path& path, const Image<Rgb>& image, bool a
     writeFile(path, header, buffer, image.height());
 }
 
+void addColorLayer(std::vector<ExrChannel>& channels,
+                   const std::string& layer,
+                   const Image<Rgb>& image)
+{
+    const std::string prefix = layer.empty() ? "" : layer + ".";
+    for (int c = 0; c < 3; ++c) {
+        ExrChannel channel{prefix + "RGB"[c], Image<float>(image.width(), image.height())};
+        std::ranges::transform(image.pixels(),
+                               channel.values.pixels().begin(),
+                               [c](const Rgb& pixel) { return pixel[c]; });
+        channels.push_back(std::move(channel));
+    }
+}
+
 void writeLayeredExr(const std::filesystem::path& path, const std::vector<ExrChannel>& channels)
 {
     INSITU_CHECK(!channels.empty() && !channels.front().values.empty(), "nothing to write");

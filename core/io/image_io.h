@@ -54,6 +54,11 @@ struct ExrChannel {
     std::string name;
     Image<float> values;
 };
+/// Appends a colour image as "<layer>.R", "<layer>.G", "<layer>.B", or "R", "G", "B" when `layer`
+/// is empty: what readers without layers show.
+void addColorLayer(std::vector<ExrChannel>& channels,
+                   const std::string& layer,
+                   const Image<Rgb>& image);
 /// Float channels of equal size, stored in order of name (as EXR demands); at least one.
 void writeLayeredExr(const std::filesystem::path& path, const std::vector<ExrChannel>& channels);
 /// All channels of the first part as float, in order of name, over the data window. Values are

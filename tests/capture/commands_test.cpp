@@ -7,6 +7,8 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
+
 namespace insitu {
 namespace {
 
@@ -63,6 +65,27 @@ TEST_F(MergeAndProbe, MergeRecoversTheSceneUpToOneScaleAChannel)
     ASSERT_EQ(again.exit_code, 0) << again.messages;
     const Image<Rgb> same = readRadiance(file("again.exr")).pixels;
     EXPECT_NEAR(same(20, 100).g / radiance(20, 100).g, 1.0, 1e-5);
+}
+
+TEST_F(MergeAndProbe, AnExrHoldsVarianceAndValidityTheOthersDoNot)
+{
+    const std::string name = file("layers.EXR");
+    const ProgramRun run = runProgram(command("merge", ".jpg", {"-o", name}));
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    std::map<std::string, Image<float>> layers;
+    for (ExrChannel& channel : readLayeredExr(name))
+        layers.emplace(channel.name, std::move(channel.values));
+    ASSERT_EQ(layers.size(), 7u);
+    const auto at = [&](const char* layer, int x, int y) { return layers.at(layer)(x, y); };
+    EXPECT_EQ(readRadiance(name).pixels(20, 100).g, at("G", 20, 100));
+    const float deviation = std::sqrt(at("variance.G", 20, 100)) / at("G", 20, 100);
+    EXPECT_GT(deviation, 1e-4f);  // rounding to 8 bits in five frames leaves 0.1 to 3 %
+    EXPECT_LT(deviation, 0.03f);
+    EXPECT_EQ(at("validity", 20, 100), 0.0f);
+    EXPECT_EQ(at("validity", 155, 155), 1.0f);  // 20 / 16 of full scale in the shortest
+
+    EXPECT_EQ(runProgram(command("merge", ".jpg", {"-o", file("plain.pfm")})).exit_code, 0);
+    EXPECT_EQ(readRadiance(file("plain.pfm")).pixels(20, 100).g, at("G", 20, 100));
 }
 
 TEST_F(MergeAndProbe, ExposuresAreAskedForAndTaken)

@@ -277,6 +277,22 @@ TEST(Exr, LayersComeBackByName)
                 HasSubstr("has no R, G, B or Y"));
 }
 
+TEST(Exr, AColourLayerStandsBesideThePlainImage)
+{
+    const TemporaryFolder folder;
+    std::vector<ExrChannel> channels;
+    addColorLayer(channels, "variance", Image<Rgb>(3, 2, Rgb(4.0f, 5.0f, 6.0f)));
+    addColorLayer(channels, "", Image<Rgb>(3, 2, Rgb(1.0f, 2.0f, 3.0f)));
+    writeLayeredExr(folder / "a.exr", channels);
+    EXPECT_EQ(readRadiance(folder / "a.exr").pixels(2, 1), Rgb(1.0f, 2.0f, 3.0f));
+    const std::vector<ExrChannel> read = readLayeredExr(folder / "a.exr");
+    ASSERT_EQ(read.size(), 6u);
+    EXPECT_EQ(read[3].name, "variance.B");
+    EXPECT_EQ(read[3].values(0, 0), 6.0f);
+    EXPECT_EQ(read[5].name, "variance.R");
+    EXPECT_EQ(read[5].values(2, 1), 4.0f);
+}
+
 TEST(Exr, ChecksTheDeclaredSizeBeforeAllocating)
 {
     const TemporaryFolder folder;
