@@ -16,7 +16,7 @@ namespace insitu {
 namespace {
 
 /// Rows that one task merges; their neighbours above and below are looked at twice.
-constexpr int kRowsPerTask = 16;
+constexpr int kRowsPerTask = 32;
 
 void checkResponse(const ResponseCurve& response)
 {

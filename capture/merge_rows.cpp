@@ -1,6 +1,7 @@
 #include "capture/merge_rows.h"
 
 #include <algorithm>
+#include <span>
 
 // Frames are numbered from the longest, 0. Two numbers decide what a pixel's channel rests on:
 //
@@ -229,51 +230,45 @@ private:
 
     /// The same for a pixel at which some frames are excluded. Returns its validity.
     [[nodiscard]] std::uint8_t mergeMasked(
-        int x, int y, int clear, float* radiance, float* variance) const
+        int x, int y, int clear, float* radiance, float* variance)
     {
-        std::vector<int> allowed;
+        allowed_.clear();
         for (int k = 0; k < count_; ++k) {
             const Image<std::uint8_t>& mask = (*excluded_)[static_cast<std::size_t>(k)];
-            if (mask.empty() || mask(x, y) == 0) allowed.push_back(k);
+            if (mask.empty() || mask(x, y) == 0) allowed_.push_back(k);
         }
-        if (allowed.empty())
+        if (allowed_.empty())
             for (int k = 0; k < count_; ++k)
-                allowed.push_back(k);
+                allowed_.push_back(k);
         unsigned flags = kMergeExcluded;
         unsigned black = kMergeBlack;
         for (int c = 0; c < 3; ++c)
-            mergeMaskedChannel(x, c, clear, allowed, radiance[c], variance[c], flags, black);
+            mergeMaskedChannel(x, c, clear, radiance[c], variance[c], flags, black);
         return static_cast<std::uint8_t>(flags | black);
     }
 
-    void mergeMaskedChannel(int x,
-                            int c,
-                            int clear,
-                            const std::vector<int>& allowed,
-                            float& radiance,
-                            float& variance,
-                            unsigned& flags,
-                            unsigned& black) const
+    void mergeMaskedChannel(
+        int x, int c, int clear, float& radiance, float& variance, unsigned& flags, unsigned& black)
     {
         const std::size_t pixel = 3 * static_cast<std::size_t>(x);
         const std::size_t v = pixel + static_cast<std::size_t>(c);
         const auto codeOf = [&](int k) {
             return static_cast<int>(rows_[static_cast<std::size_t>(k)][v]);
         };
-        auto first = allowed.end();
-        while (first != allowed.begin() && !isClipped(first[-1], codeOf(first[-1])))
+        auto first = allowed_.end();
+        while (first != allowed_.begin() && !isClipped(first[-1], codeOf(first[-1])))
             --first;
-        std::vector<int> used(first, allowed.end());
+        std::span<const int> used(first, allowed_.end());
         if (!used.empty() && used.back() < clear) {
             while (!used.empty() && isSuspect(used.front(), pixel, c))
-                used.erase(used.begin());
+                used = used.subspan(1);
             if (!used.empty()) flags |= kMergeUnconfirmed;
         }
         while (used.size() > 1 && used.front() < clear && clear <= used.back() &&
                !tables_.agree(c, used[0], codeOf(used[0]), used[1], codeOf(used[1])))
-            used.erase(used.begin());
+            used = used.subspan(1);
         if (used.empty()) {
-            lowerBound(c, allowed.back(), codeOf(allowed.back()), radiance, variance);
+            lowerBound(c, allowed_.back(), codeOf(allowed_.back()), radiance, variance);
             flags |= kMergeClipped;
             black = 0;
             return;
@@ -281,14 +276,14 @@ private:
         const MergeFrame& frame = tables_.frames()[static_cast<std::size_t>(used.front())];
         const int code = codeOf(used.front());
         const bool is_black = isBlack(used.front(), code);
-        std::vector<double> weights;
+        weights_.clear();
         const double predicted = static_cast<double>(tables_.exposures(c)[code]) / frame.exposure;
-        variance = static_cast<float>(tables_.weigh(c, used, predicted, is_black, weights));
+        variance = static_cast<float>(tables_.weigh(c, used, predicted, is_black, weights_));
         double sum = 0.0;
-        for (std::size_t j = 0; j < weights.size(); ++j)
-            sum += weights[j] * static_cast<double>(tables_.exposures(c)[codeOf(used[j])]);
+        for (std::size_t j = 0; j < weights_.size(); ++j)
+            sum += weights_[j] * static_cast<double>(tables_.exposures(c)[codeOf(used[j])]);
         radiance = static_cast<float>(sum);
-        if (weights.size() == 1) flags |= kMergeSingleFrame;
+        if (weights_.size() == 1) flags |= kMergeSingleFrame;
         if (!is_black) black = 0;
     }
 
@@ -305,6 +300,8 @@ private:
     std::vector<std::int16_t> clear_;
     std::vector<std::uint8_t> masked_;
     bool any_masked_ = false;
+    std::vector<int> allowed_;     ///< frames not excluded at a pixel
+    std::vector<double> weights_;  ///< of those in use
 };
 
 }  // namespace

@@ -108,7 +108,7 @@ MergeTables::FrameWeight MergeTables::frameWeight(int c,
 }
 
 double MergeTables::weigh(int c,
-                          const std::vector<int>& used,
+                          std::span<const int> used,
                           double radiance,
                           bool black,
                           std::vector<double>& weights) const

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace insitu {
@@ -79,7 +80,7 @@ public:
     /// The same as an entry for frames that do not follow each other: `used` in order of exposure,
     /// the first one the reference. Weights are added to `weights`; returns the variance.
     [[nodiscard]] double weigh(int c,
-                               const std::vector<int>& used,
+                               std::span<const int> used,
                                double radiance,
                                bool black,
                                std::vector<double>& weights) const;

@@ -1,3 +1,4 @@
+#include "capture/noise_blocks.h"
 #include "capture/noise_model.h"
 #include "core/check.h"
 #include "core/parallel.h"
@@ -20,16 +21,8 @@ namespace insitu {
 
 namespace {
 
-/// Blocks span several of JPEG's 8x8, whose own means are coded too.
-constexpr int kBlock = 16;
-constexpr int kBlockPixels = kBlock * kBlock;
-/// Per block: pixels less the plane that is taken out.
-constexpr double kFreedoms = kBlockPixels - 3;
 /// Blocks taken from all pairs of frames together, evenly.
 constexpr std::int64_t kBlocks = 3000;
-/// Codes used, fractions of full scale: away from black and from clipping.
-constexpr double kLeastCode = 0.04;
-constexpr double kGreatestCode = 0.97;
 /// Levels per factor of two; the flattest share of the blocks of each is used.
 constexpr double kLevelsPerOctave = 2.0;
 constexpr double kFlatShare = 0.5;
@@ -46,22 +39,6 @@ constexpr double kPriorWeight = 1.0;
 
 using Unknowns = std::array<double, 3>;  // read variance, gain, code variance beyond rounding
 
-/// One block of a pair of frames: second moments of both after a plane was taken out.
-struct Block {
-    double x1 = 0.0;  ///< mean exposure in the longer frame
-    double x2 = 0.0;  ///< in the shorter frame
-    double z1 = 0.0;  ///< their codes, 8-bit steps
-    double z2 = 0.0;
-    double var1 = 0.0;
-    double var2 = 0.0;  ///< of rho x_2
-    double covariance = 0.0;
-    double neighbours = 0.0;  ///< mean product of residuals side by side
-    double rho = 1.0;
-    double flatness = 0.0;  ///< variance of the best mean of both, over what noise explains
-
-    [[nodiscard]] double residual() const { return var1 + var2 - 2.0 * covariance; }
-};
-
 /// Mean over blocks of one level: an equation row · unknowns = residual.
 struct Level {
     Unknowns row{};
@@ -69,45 +46,6 @@ struct Level {
     double rounding = 0.0;  ///< part of the residual that is known
     double blocks = 0.0;
 };
-
-using Samples = std::array<double, kBlockPixels>;
-
-/// Takes the mean and the plane out of the samples; returns the mean.
-double removePlane(Samples& samples)
-{
-    double sum = 0.0;
-    double sum_x = 0.0;
-    double sum_y = 0.0;
-    constexpr double kMiddle = 0.5 * (kBlock - 1);
-    for (int i = 0; i < kBlockPixels; ++i) {
-        const double value = samples[static_cast<std::size_t>(i)];
-        sum += value;
-        sum_x += value * (i % kBlock - kMiddle);
-        sum_y += value * (i / kBlock - kMiddle);
-    }
-    constexpr double kSquares = kBlockPixels * (kBlock * kBlock - 1) / 12.0;
-    const double mean = sum / kBlockPixels;
-    for (int i = 0; i < kBlockPixels; ++i)
-        samples[static_cast<std::size_t>(i)] -= mean + sum_x / kSquares * (i % kBlock - kMiddle) +
-                                                sum_y / kSquares * (i / kBlock - kMiddle);
-    return mean;
-}
-
-double meanProduct(const Samples& a, const Samples& b)
-{
-    double sum = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i)
-        sum += a[i] * b[i];
-    return sum / kFreedoms;
-}
-
-double neighbourProduct(const Samples& a, const Samples& b)
-{
-    double sum = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i)
-        if (i % kBlock + 1 < kBlock) sum += (a[i] - b[i]) * (a[i + 1] - b[i + 1]);
-    return sum / (kBlock * (kBlock - 1));
-}
 
 class Estimator {
 public:
@@ -117,26 +55,24 @@ public:
           max_code_(bracket.frames.front().image.max_code),
           assumed_(assumedNoise(response, bracket.metadata.exposure.iso, max_code_))
     {
-        for (std::size_t c = 0; c < 3; ++c) {
-            exposure_[c].resize(static_cast<std::size_t>(max_code_) + 1);
-            for (std::size_t z = 0; z < exposure_[c].size(); ++z)
-                exposure_[c][z] = response.decode(static_cast<int>(c),
-                                                  static_cast<double>(z) * 255.0 / max_code_);
-        }
     }
 
     [[nodiscard]] NoiseEstimate estimate() const
     {
         NoiseEstimate result{assumed_, {}};
         const std::size_t pairs = bracket_.frames.size() - 1;
-        std::vector<std::array<std::vector<Block>, 3>> blocks(pairs);
-        parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t pair) {
-            const auto k = static_cast<std::size_t>(pair);
-            blocks[k] = blocksOf(bracket_.frames[k], bracket_.frames[k + 1]);
-        });
+        std::vector<std::array<std::vector<NoiseBlock>, 3>> blocks(pairs);
+        if (pairs > 0) {
+            const std::int64_t most = kBlocks / static_cast<std::int64_t>(pairs) + 1;
+            const NoiseBlockReader reader(response_, max_code_);
+            parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t pair) {
+                const auto k = static_cast<std::size_t>(pair);
+                blocks[k] = reader.read(bracket_.frames[k], bracket_.frames[k + 1], most);
+            });
+        }
         std::string untold;
         for (std::size_t c = 0; c < 3; ++c) {
-            std::vector<std::vector<Block>> of_channel;
+            std::vector<std::vector<NoiseBlock>> of_channel;
             for (auto& pair : blocks)
                 of_channel.push_back(std::move(pair[c]));
             if (!estimateChannel(static_cast<int>(c), of_channel, result.model.channels[c]))
@@ -158,60 +94,6 @@ private:
                             iso ? fmt::format("{:g}", *iso) : "800, since none is known")};
     }
 
-    /// Codes of one channel of a block as exposures times `factor`; false when one is unusable.
-    [[nodiscard]] bool read(
-        const EncodedImage& image, int x0, int y0, int c, double factor, Samples& samples) const
-    {
-        const int least = static_cast<int>(std::ceil(kLeastCode * max_code_));
-        const int greatest = static_cast<int>(kGreatestCode * max_code_);
-        const auto& table = exposure_[static_cast<std::size_t>(c)];
-        std::size_t i = 0;
-        for (int y = y0; y < y0 + kBlock; ++y) {
-            for (int x = x0; x < x0 + kBlock; ++x) {
-                const int code = image.codes(x, y)[c];
-                if (code < least || code > greatest) return false;
-                samples[i++] = factor * table[static_cast<std::size_t>(code)];
-            }
-        }
-        return true;
-    }
-
-    [[nodiscard]] std::array<std::vector<Block>, 3> blocksOf(const BracketFrame& longer,
-                                                             const BracketFrame& shorter) const
-    {
-        std::array<std::vector<Block>, 3> blocks;
-        if (shorter.image.max_code != max_code_ || longer.image.max_code != max_code_)
-            return blocks;
-        const double rho = longer.relative_exposure / shorter.relative_exposure;
-        const std::int64_t columns = longer.image.codes.width() / kBlock;
-        const std::int64_t all = columns * (longer.image.codes.height() / kBlock);
-        const auto pairs = static_cast<std::int64_t>(bracket_.frames.size()) - 1;
-        const std::int64_t taken = std::min(all, kBlocks / pairs + 1);
-        Samples first{};
-        Samples second{};
-        for (std::int64_t i = 0; i < taken; ++i) {
-            const std::int64_t place = i * all / taken;
-            const int x0 = static_cast<int>(place % columns) * kBlock;
-            const int y0 = static_cast<int>(place / columns) * kBlock;
-            for (int c = 0; c < 3; ++c) {
-                if (!read(longer.image, x0, y0, c, 1.0, first)) continue;
-                if (!read(shorter.image, x0, y0, c, rho, second)) continue;
-                Block block;
-                block.rho = rho;
-                block.x1 = removePlane(first);
-                block.x2 = removePlane(second) / rho;
-                block.z1 = response_.encode(c, block.x1);
-                block.z2 = response_.encode(c, block.x2);
-                block.var1 = meanProduct(first, first);
-                block.var2 = meanProduct(second, second);
-                block.covariance = meanProduct(first, second);
-                block.neighbours = neighbourProduct(first, second);
-                blocks[static_cast<std::size_t>(c)].push_back(block);
-            }
-        }
-        return blocks;
-    }
-
     [[nodiscard]] double slopeAt(int c, double code) const
     {
         const double z = std::clamp(code, 0.5, 254.5);
@@ -220,7 +102,7 @@ private:
 
     [[nodiscard]] double rounding() const { return 255.0 * 255.0 / (12.0 * max_code_ * max_code_); }
 
-    [[nodiscard]] double flatnessOf(const Block& block, int c, const NoiseModel& noise) const
+    [[nodiscard]] double flatnessOf(const NoiseBlock& block, int c, const NoiseModel& noise) const
     {
         const double v1 = noise.variance(response_, c, block.z1);
         const double v2 = block.rho * block.rho * noise.variance(response_, c, block.z2);
@@ -232,19 +114,19 @@ private:
     }
 
     /// The flattest blocks of one level of one pair as one equation; `blocks` is reordered.
-    [[nodiscard]] Level levelOf(std::span<Block> blocks, int c, const NoiseModel& noise) const
+    [[nodiscard]] Level levelOf(std::span<NoiseBlock> blocks, int c, const NoiseModel& noise) const
     {
-        for (Block& block : blocks)
+        for (NoiseBlock& block : blocks)
             block.flatness = flatnessOf(block, c, noise);
-        std::ranges::sort(blocks, {}, &Block::flatness);
+        std::ranges::sort(blocks, {}, &NoiseBlock::flatness);
         const auto used =
             static_cast<std::size_t>(std::ceil(kFlatShare * static_cast<double>(blocks.size())));
-        const std::span<Block> flat = blocks.first(used);
-        std::ranges::sort(flat, {}, [](const Block& b) { return b.residual() / b.x1; });
+        const std::span<NoiseBlock> flat = blocks.first(used);
+        std::ranges::sort(flat, {}, [](const NoiseBlock& b) { return b.residual() / b.x1; });
         Level level;
         level.residual = flat[used / 2].residual() / flat[used / 2].x1;
         double x1 = 0.0;
-        for (const Block& b : flat) {
+        for (const NoiseBlock& b : flat) {
             const double s1 = slopeAt(c, b.z1);
             const double s2 = b.rho * slopeAt(c, b.z2);
             level.row[0] += 1.0 + b.rho * b.rho;
@@ -260,18 +142,18 @@ private:
         return level;
     }
 
-    [[nodiscard]] std::vector<Level> levelsOf(std::vector<std::vector<Block>>& pairs,
+    [[nodiscard]] std::vector<Level> levelsOf(std::vector<std::vector<NoiseBlock>>& pairs,
                                               int c,
                                               const NoiseModel& noise) const
     {
-        const auto levelIndex = [](const Block& b) {
+        const auto levelIndex = [](const NoiseBlock& b) {
             return std::floor(kLevelsPerOctave * std::log2(b.x1));
         };
         std::vector<Level> levels;
         for (auto& blocks : pairs) {
-            std::ranges::stable_sort(blocks, {}, [](const Block& b) { return b.x1; });
+            std::ranges::stable_sort(blocks, {}, [](const NoiseBlock& b) { return b.x1; });
             for (auto first = blocks.begin(); first != blocks.end();) {
-                const auto last = std::find_if(first, blocks.end(), [&](const Block& b) {
+                const auto last = std::find_if(first, blocks.end(), [&](const NoiseBlock& b) {
                     return levelIndex(b) != levelIndex(*first);
                 });
                 levels.push_back(levelOf({first, last}, c, noise));
@@ -282,7 +164,7 @@ private:
     }
 
     [[nodiscard]] bool estimateChannel(int c,
-                                       std::vector<std::vector<Block>>& pairs,
+                                       std::vector<std::vector<NoiseBlock>>& pairs,
                                        ChannelNoise& result) const
     {
         NoiseModel noise = assumed_;
@@ -346,7 +228,8 @@ private:
     }
 
     /// Weighted least squares for unknowns >= 0, weights by the residuals' own spread at `current`
-    /// (a median of variances of kFreedoms degrees each), with the assumed noise as a weak prior.
+    /// (a median of variances of NoiseBlock::kFreedoms degrees each), with the assumed noise as a
+    /// weak prior.
     [[nodiscard]] ChannelNoise fit(const std::vector<Level>& levels,
                                    int c,
                                    const ChannelNoise& current) const
@@ -358,7 +241,7 @@ private:
         for (const Level& level : levels) {
             const double expected = predicted(level, current);
             constexpr double kMedianSpread = 1.57;  // pi / 2: a median against a mean
-            const double weight = level.blocks * kFreedoms / (2.0 * kMedianSpread);
+            const double weight = level.blocks * NoiseBlock::kFreedoms / (2.0 * kMedianSpread);
             for (std::size_t i = 0; i < 3; ++i) {
                 const double row_i = level.row[i] * scale[i] / expected;
                 right[i] += weight * row_i * (level.residual - level.rounding) / expected;
@@ -385,23 +268,28 @@ private:
     {
         Unknowns x{};
         constexpr int kSweeps = 2000;
-        for (int sweep = 0; sweep < kSweeps; ++sweep) {
+        constexpr double kStill = 1e-9;
+        double change = 1.0;
+        for (int sweep = 0; sweep < kSweeps && change > kStill; ++sweep) {
+            change = 0.0;
             for (std::size_t i = 0; i < 3; ++i) {
                 double rest = right[i];
                 for (std::size_t j = 0; j < 3; ++j)
                     if (j != i) rest -= normal[i][j] * x[j];
-                x[i] = std::max(0.0, rest / normal[i][i]);
+                const double better = std::max(0.0, rest / normal[i][i]);
+                change = std::max(change, std::abs(better - x[i]));
+                x[i] = better;
             }
         }
         return x;
     }
 
     /// Median over all blocks of what neighbours share.
-    [[nodiscard]] static double correlation(const std::vector<std::vector<Block>>& pairs)
+    [[nodiscard]] static double correlation(const std::vector<std::vector<NoiseBlock>>& pairs)
     {
         std::vector<double> ratios;
         for (const auto& blocks : pairs)
-            for (const Block& block : blocks)
+            for (const NoiseBlock& block : blocks)
                 if (block.residual() > 0.0) ratios.push_back(block.neighbours / block.residual());
         if (ratios.empty()) return 0.0;
         const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
@@ -413,7 +301,6 @@ private:
     const ResponseCurve& response_;
     int max_code_;
     NoiseModel assumed_;
-    std::array<std::vector<double>, 3> exposure_;
 };
 
 }  // namespace
