@@ -161,8 +161,7 @@ bool Alignment::isIdentity() const
 
 Alignment alignBracket(const Bracket& bracket, const AlignmentOptions& options)
 {
-    const Findings problems = options.validate();
-    if (!problems.empty()) throw InputError("alignment options", problems.front().message);
+    requireValid(options.validate(), "alignment options");
     INSITU_CHECK(!bracket.frames.empty(), "empty bracket");
     const std::size_t count = bracket.frames.size();
     if (options.reference &&

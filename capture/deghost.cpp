@@ -327,8 +327,7 @@ MovedPixels findMovedPixels(const Bracket& bracket,
                             const ResponseCurve& response,
                             const DeghostOptions& options)
 {
-    const Findings problems = options.validate();
-    if (!problems.empty()) throw InputError("deghost options", problems.front().message);
+    requireValid(options.validate(), "deghost options");
     INSITU_CHECK(!bracket.frames.empty(), "empty bracket");
     MovedPixels moved;
     if (bracket.frames.size() == 1) {
@@ -339,6 +338,23 @@ MovedPixels findMovedPixels(const Bracket& bracket,
     moved.masks = Deghoster(bracket, response, options).masks();
     report(bracket, moved);
     return moved;
+}
+
+void exclude(Bracket& bracket, const MovedPixels& moved)
+{
+    INSITU_CHECK(moved.masks.size() == bracket.frames.size(),
+                 "{} masks for {} frames",
+                 moved.masks.size(),
+                 bracket.frames.size());
+    for (std::size_t k = 0; k < moved.masks.size(); ++k) {
+        Image<std::uint8_t>& own = bracket.frames[k].excluded;
+        if (own.empty()) {
+            own = moved.masks[k];
+            continue;
+        }
+        for (std::size_t i = 0; i < own.pixelCount(); ++i)
+            own.pixels()[i] |= moved.masks[k].pixels()[i];
+    }
 }
 
 }  // namespace insitu

@@ -48,4 +48,7 @@ struct MovedPixels {
                                           const ResponseCurve& response,
                                           const DeghostOptions& options = {});
 
+/// Adds the masks to those of the bracket's frames.
+void exclude(Bracket& bracket, const MovedPixels& moved);
+
 }  // namespace insitu

@@ -44,6 +44,12 @@ void checkExcluded(const Bracket& bracket, const std::vector<Image<std::uint8_t>
                      mask.height());
 }
 
+bool hasMasks(const Bracket& bracket)
+{
+    return std::ranges::any_of(bracket.frames,
+                               [](const BracketFrame& frame) { return !frame.excluded.empty(); });
+}
+
 /// 8-bit frames as 16-bit ones where a bracket has both.
 Bracket promoted(const Bracket& bracket)
 {
@@ -142,8 +148,7 @@ MergeResult mergeBracket(const Bracket& bracket,
                          const MergeOptions& options,
                          const std::vector<Image<std::uint8_t>>* excluded)
 {
-    const Findings problems = options.validate();
-    if (!problems.empty()) throw InputError("merge options", problems.front().message);
+    requireValid(options.validate(), "merge options");
     INSITU_CHECK(!bracket.frames.empty(), "empty bracket");
     checkResponse(response);
     checkExcluded(bracket, excluded);
@@ -160,6 +165,12 @@ MergeResult mergeBracket(const Bracket& bracket,
         NoiseEstimate estimate = estimateNoise(bracket, response);
         result.noise = estimate.model;
         append(result.findings, std::move(estimate.findings));
+    }
+    std::vector<Image<std::uint8_t>> own_masks;
+    if (excluded == nullptr && hasMasks(bracket)) {
+        for (const BracketFrame& frame : bracket.frames)
+            own_masks.push_back(frame.excluded);
+        excluded = &own_masks;
     }
     const MergeTables tables(bracket, response, result.noise, options);
 

@@ -58,8 +58,8 @@ struct MergeResult {
 /// clipping: JPEG, demosaicing and blooming spoil neighbours.
 ///
 /// `excluded`: for each frame (order of bracket.frames) a mask of pixels not to be used (non-zero;
-/// something moved), of the bracket's size, or empty for none. Where every frame is excluded the
-/// masks are not followed.
+/// something moved), of the bracket's size, or empty for none; nullptr: the frames' own masks
+/// (BracketFrame::excluded). Where every frame is excluded the masks are not followed.
 /// Memory: 26 bytes a pixel for the result. InputError: bad options; a response that is not finite
 /// and strictly increasing.
 [[nodiscard]] MergeResult mergeBracket(const Bracket& bracket,

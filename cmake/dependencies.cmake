@@ -18,5 +18,5 @@ if(INSITU_BUILD_TESTS)
 endif()
 if(INSITU_BUILD_BENCH)
   find_package(benchmark REQUIRED)
-  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs photo)  # a peer
+  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs photo video)  # peers
 endif()

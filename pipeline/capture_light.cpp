@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace insitu {
 
@@ -51,21 +52,17 @@ ProbePicture probePicture(const ProjectProbe& probe,
         files.push_back(image.path);
         exposures.push_back(image.exposure);
     }
-    const Bracket bracket = readBracket(files, exposures);
-    append(light.findings, bracket.findings);
+    Bracket bracket = readBracket(files, exposures);
+    append(light.findings, std::exchange(bracket.findings, {}));
     light.metadata = bracket.metadata;
     light.radiance_unit_known = true;
-    if (probe.response) {
-        light.response = readResponse(*probe.response);
-        light.response_known = true;
-    } else {
-        const ResponseRecovery recovery = recoverResponse(bracket, options.response);
-        append(light.findings, recovery.findings);
-        light.response = recovery.curve;
-        light.response_known = !hasFinding(recovery.findings, "response-not-recoverable");
-    }
-    MergeResult merged = mergeBracket(bracket, light.response, options.merge);
-    append(light.findings, merged.findings);
+    std::optional<ResponseCurve> response;
+    if (probe.response) response = readResponse(*probe.response);
+    CapturedRadiance captured = captureRadiance(std::move(bracket), response, options.capture);
+    append(light.findings, std::move(captured.findings));
+    light.response = std::move(captured.response);
+    light.response_known = captured.response_known;
+    MergeResult& merged = captured.merged;
     ProbePicture picture{std::move(merged.radiance.pixels), {}};
     if (merged.clipped_fraction > 0.0) {
         picture.clipped = Image<Rgb>(merged.clipped.width(), merged.clipped.height());

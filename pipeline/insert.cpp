@@ -177,7 +177,7 @@ CapturedLight cachedLight(const Project& project,
         key.add(image.path.filename().string(), image.exposure).addFile(image.path);
     if (probe.response) key.add(probe.response->filename().string()).addFile(*probe.response);
     if (!probe.view_position_m) key.add(camera);
-    key.add(proxy.faces(), proxy.openings(), options.response, options.merge);
+    key.add(proxy.faces(), proxy.openings(), options.capture);
     if (auto kept = cache.find<CapturedLight>(key)) {
         from_cache = true;
         return *std::move(kept);

@@ -1,7 +1,6 @@
 #pragma once
 
-#include "capture/hdr_merge.h"
-#include "capture/response_recovery.h"
+#include "capture/radiance_capture.h"
 #include "composite/differential.h"
 #include "core/environment_map.h"
 #include "core/progress.h"
@@ -15,8 +14,7 @@
 namespace insitu {
 
 struct InsertOptions {
-    ResponseOptions response;
-    MergeOptions merge;
+    CaptureOptions capture;
     RoomLightOptions light;
     InsertionOptions render;
     CompositeOptions composite;

@@ -95,9 +95,29 @@ void parts(auto& archive, PartsOf<ResponseOptions> auto& v)
 {
     archive(v.samples, v.smoothness);
 }
+void parts(auto& archive, PartsOf<ChannelNoise> auto& v)
+{
+    archive(v.read_variance, v.gain, v.code_variance, v.neighbour_correlation);
+}
+void parts(auto& archive, PartsOf<NoiseModel> auto& v)
+{
+    archive(v.channels);
+}
 void parts(auto& archive, PartsOf<MergeOptions> auto& v)
 {
-    archive(v.clip_fraction, v.black_fraction);
+    archive(v.clip_fraction, v.black_fraction, v.noise);
+}
+void parts(auto& archive, PartsOf<AlignmentOptions> auto& v)
+{
+    archive(v.model, v.max_shift_fraction, v.min_shift_px, v.reference);
+}
+void parts(auto& archive, PartsOf<DeghostOptions> auto& v)
+{
+    archive(v.sigmas, v.tolerance, v.min_region_px, v.grow_px);
+}
+void parts(auto& archive, PartsOf<CaptureOptions> auto& v)
+{
+    archive(v.align, v.deghost, v.alignment, v.ghosts, v.response, v.merge);
 }
 void parts(auto& archive, PartsOf<RoomLightOptions> auto& v)
 {
@@ -121,7 +141,10 @@ void parts(auto& archive, PartsOf<InsertionOptions> auto& v)
     archive(v.technique, v.max_samples, v.min_samples, v.target_error, v.max_seconds, v.seed);
     archive(v.path, v.interreflection, v.filter);
 }
-static_assert(sizeof(ResponseOptions) == 16 && sizeof(MergeOptions) == 16);
+static_assert(sizeof(ResponseOptions) == 16 && sizeof(MergeOptions) == 120);
+static_assert(sizeof(ChannelNoise) == 32 && sizeof(NoiseModel) == 96);
+static_assert(sizeof(AlignmentOptions) == 32 && sizeof(DeghostOptions) == 24);
+static_assert(sizeof(CaptureOptions) == 200);
 static_assert(sizeof(RoomLightOptions) == 56 && sizeof(PathOptions) == 8);
 static_assert(sizeof(InterreflectionOptions) == 24 && sizeof(IrradianceFilterOptions) == 16);
 static_assert(sizeof(InsertionOptions) == 88);

@@ -37,19 +37,6 @@ std::vector<Exposure> exposuresFromText(const BracketArguments& arguments)
     return exposures;
 }
 
-ResponseCurve responseFor(const BracketArguments& arguments,
-                          const Bracket& bracket,
-                          Context& context)
-{
-    if (!arguments.response.empty()) {
-        const Json json = readJson(arguments.response);
-        return responseFromJson(JsonNode(json, arguments.response.string()));
-    }
-    ResponseRecovery recovery = recoverResponse(bracket, arguments.recovery);
-    context.print(recovery.findings);
-    return std::move(recovery.curve);
-}
-
 }  // namespace
 
 double secondsFromText(const std::string& text)
@@ -76,40 +63,50 @@ void addBracketOptions(CLI::App& command, BracketArguments& arguments)
         ->delimiter(',');
     command.add_option(
         "--response", arguments.response, "Saved response curve (.json; default: recovered)");
+    command.add_flag("--align",
+                     arguments.capture.align,
+                     "Lay the frames onto each other: for brackets held in the hand");
+    command.add_flag("--deghost",
+                     arguments.capture.deghost,
+                     "Leave out what moved between the exposures (experimental: masks too much "
+                     "where the response is uncertain)");
     command
         .add_option("--samples",
-                    arguments.recovery.samples,
+                    arguments.capture.response.samples,
                     "Places of the picture used to recover the response")
         ->check(CLI::Range(50, 100'000))
         ->capture_default_str();
     command
         .add_option("--smoothness",
-                    arguments.recovery.smoothness,
+                    arguments.capture.response.smoothness,
                     "Weight of the penalty on bends of the recovered response")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     command
         .add_option("--clip",
-                    arguments.merge.clip_fraction,
+                    arguments.capture.merge.clip_fraction,
                     "Codes above this fraction of full scale count as overexposed")
         ->check(CLI::Range(0.501, 1.0))
         ->capture_default_str();
     command
         .add_option("--black",
-                    arguments.merge.black_fraction,
+                    arguments.capture.merge.black_fraction,
                     "Codes below this fraction of full scale count as black")
         ->check(CLI::Range(0.0, 0.499))
         ->capture_default_str();
 }
 
-BracketRadiance mergeArguments(const BracketArguments& arguments, Context& context)
+CapturedRadiance mergeArguments(const BracketArguments& arguments, Context& context)
 {
-    const Bracket bracket = readBracket(arguments.images, exposuresFromText(arguments));
+    Bracket bracket = readBracket(arguments.images, exposuresFromText(arguments));
     context.print(bracket.findings);
-    BracketRadiance result;
-    result.response = responseFor(arguments, bracket, context);
-    result.merged = mergeBracket(bracket, result.response, arguments.merge);
-    context.print(result.merged.findings);
+    std::optional<ResponseCurve> response;
+    if (!arguments.response.empty()) {
+        const Json json = readJson(arguments.response);
+        response = responseFromJson(JsonNode(json, arguments.response.string()));
+    }
+    CapturedRadiance result = captureRadiance(std::move(bracket), response, arguments.capture);
+    context.print(result.findings);
     return result;
 }
 

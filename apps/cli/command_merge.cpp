@@ -51,7 +51,7 @@ void runMerge(const MergeArguments& arguments, Context& context)
     if (!arguments.save_response.empty()) context.checkOutput(arguments.save_response);
     if (!isRadianceFile(arguments.output))
         throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
-    const BracketRadiance result = mergeArguments(arguments.bracket, context);
+    const CapturedRadiance result = mergeArguments(arguments.bracket, context);
     writeMerged(arguments.output, result.merged);
     if (!arguments.save_response.empty())
         writeJson(arguments.save_response, toJson(result.response));
