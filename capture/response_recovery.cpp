@@ -1,7 +1,10 @@
 #include "capture/response_recovery.h"
 
-#include "capture/response_samples.h"
-#include "capture/response_solve.h"
+#include "capture/held_out.h"
+#include "capture/response_finish.h"
+#include "capture/response_fit.h"
+#include "capture/response_methods.h"
+#include "capture/response_patches.h"
 #include "core/check.h"
 #include "core/parallel.h"
 
@@ -9,111 +12,44 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 
 namespace insitu {
 
 namespace {
 
-using detail::kPatchSide;
+using detail::BracketPixels;
+using detail::CodeReach;
+using detail::CurveFit;
 using detail::LogCurve;
-using detail::PatchObservation;
 using detail::PatchObservations;
-using detail::ResponseSample;
-using detail::ResponseSolution;
+using detail::PixelGroups;
 
-/// Fewer patches than this cannot carry a curve.
+/// Fewer patches, or groups of pixels, than this cannot carry a curve.
 constexpr std::size_t kFewestPatches = 20;
-/// Exposures nearer than this are no two exposures.
-constexpr double kLeastRatio = 1.01;
-/// Smallest step of ln(exposure) between codes after the monotone fix.
-constexpr double kSmallestStep = 1e-5;
-/// Codes that every channel's samples should reach; else the curve's ends are extrapolated.
-constexpr double kLowReach = 16.0;
-constexpr double kHighReach = 240.0;
+constexpr std::size_t kFewestGroups = 24;
+/// Scale of ResponseOptions::smoothness for groups of pixels and a bracket of 1 EV steps. In clean
+/// brackets anything from a tenth to twice as much does equally well, in the truth rooms (2 EV)
+/// from a third to three times as much.
+constexpr double kGroupSmoothness = 0.16;
+/// Steps of the bracket that smoothness is scaled for, EV: see smoothModel.
+constexpr double kLeastStep = 1.0;
+constexpr double kMostStep = 2.5;
+/// Share of blocks in which something moved: below, they are not worth a second solution; above,
+/// it is not they that are wrong.
+constexpr double kFewMoved = 5e-4;
+constexpr double kMostMoved = 0.5;
+/// Pixels on which methods are compared.
+constexpr std::size_t kJudgedPixels = 4000;
+/// A method must be this much better than the ones before it to be chosen: below, pixels' noise
+/// decides.
+constexpr double kClearlyBetter = 0.9;
 
-PatchObservation observe(const BracketFrame& frame, ResponseSample sample, int channel)
-{
-    PatchObservation observation;
-    observation.log_exposure = std::log(frame.relative_exposure);
-    std::array<double, 256> shares{};
-    double squares = 0.0;
-    constexpr double kShare = 1.0 / (kPatchSide * kPatchSide);
-    for (int y = sample.y; y < sample.y + kPatchSide; ++y) {
-        for (int x = sample.x; x < sample.x + kPatchSide; ++x) {
-            const double code = detail::codeOn255(frame.image, x, y, channel);
-            const auto low = std::min<std::size_t>(static_cast<std::size_t>(code), 254);
-            const double t = code - static_cast<double>(low);
-            shares[low] += (1.0 - t) * kShare;
-            shares[low + 1] += t * kShare;
-            observation.mean_code += code * kShare;
-            squares += code * code * kShare;
-        }
-    }
-    observation.code_variance =
-        std::max(squares - observation.mean_code * observation.mean_code, 0.0);
-    for (std::size_t z = 0; z < shares.size(); ++z)
-        if (shares[z] > 0.0) observation.histogram.emplace_back(static_cast<int>(z), shares[z]);
-    return observation;
-}
-
-/// The patches of one channel that are useful in two different exposures or more.
-std::vector<PatchObservations> observeChannel(const Bracket& bracket,
-                                              const std::vector<ResponseSample>& samples,
-                                              int channel)
-{
-    std::vector<PatchObservations> patches;
-    for (const ResponseSample sample : samples) {
-        PatchObservations patch;
-        double longest = 0.0;
-        double shortest = std::numeric_limits<double>::infinity();
-        for (const BracketFrame& frame : bracket.frames) {
-            patch.push_back(observe(frame, sample, channel));
-            patch.back().clean = detail::usefulMeanCode(frame.image, sample, channel) >= 0.0;
-            if (!patch.back().clean) continue;
-            longest = std::max(longest, frame.relative_exposure);
-            shortest = std::min(shortest, frame.relative_exposure);
-        }
-        if (longest < kLeastRatio * shortest) continue;
-        patches.push_back(std::move(patch));
-    }
-    return patches;
-}
-
-/// Isotonic regression (pool adjacent violators, [BarBrunk72]) and then a least step, so that the
-/// table is strictly increasing.
-void makeIncreasing(LogCurve& curve)
-{
-    struct Pool {
-        double sum;
-        int count;
-    };
-    std::vector<Pool> pools;
-    for (const double value : curve) {
-        pools.push_back({value, 1});
-        while (pools.size() > 1) {
-            const Pool last = pools.back();
-            Pool& before = pools[pools.size() - 2];
-            if (before.sum / before.count < last.sum / last.count) break;
-            before.sum += last.sum;
-            before.count += last.count;
-            pools.pop_back();
-        }
-    }
-    std::size_t z = 0;
-    for (const Pool& pool : pools) {
-        for (int i = 0; i < pool.count; ++i, ++z) {
-            double value = pool.sum / pool.count;
-            if (z > 0) value = std::max(value, curve[z - 1] + kSmallestStep);
-            curve[z] = value;
-        }
-    }
-}
-
-ResponseRecovery notRecoverable(const std::string& why)
+ResponseRecovery notRecoverable(const Bracket& bracket, const std::string& why)
 {
     ResponseRecovery recovery;
     recovery.curve = ResponseCurve::srgb();
+    recovery.exposure_scale.assign(bracket.frames.size(), 1.0);
     recovery.findings.push_back(
         {Severity::Warning,
          "response-not-recoverable",
@@ -123,31 +59,265 @@ ResponseRecovery notRecoverable(const std::string& why)
     return recovery;
 }
 
-void reportReach(const std::array<std::vector<PatchObservations>, 3>& channels, Findings& findings)
+/// Makes the table; false when there is none.
+bool makeCurve(std::array<LogCurve, 3> log_curves,
+               const std::array<CodeReach, 3>& reaches,
+               ResponseMethod method,
+               ResponseCurve& curve)
 {
-    double low = 0.0;
-    double high = 255.0;
-    for (const auto& patches : channels) {
-        double channel_low = 255.0;
-        double channel_high = 0.0;
-        for (const PatchObservations& patch : patches) {
-            for (const PatchObservation& o : patch) {
-                if (!o.clean) continue;
-                channel_low = std::min(channel_low, o.mean_code);
-                channel_high = std::max(channel_high, o.mean_code);
-            }
-        }
-        low = std::max(low, channel_low);
-        high = std::min(high, channel_high);
+    detail::borrowShapes(log_curves, reaches);
+    for (std::size_t c = 0; c < 3; ++c) {
+        for (const double value : log_curves[c])
+            if (!std::isfinite(value) || std::abs(value) > 80.0) return false;
+        detail::makeIncreasing(log_curves[c]);
+        for (std::size_t z = 0; z < log_curves[c].size(); ++z)
+            curve.exposure[c][z] = std::exp(log_curves[c][z] - log_curves[c][128]);
     }
-    if (low > kLowReach || high < kHighReach)
-        findings.push_back(
+    curve.source = responseMethodName(method);
+    return true;
+}
+
+double judge(const Bracket& bracket,
+             const ResponseCurve& curve,
+             const std::vector<double>& scale,
+             std::size_t most_pixels)
+{
+    HeldOutOptions options;
+    options.exposure_scale = scale;
+    options.most_pixels = most_pixels;
+    const HeldOutError error = predictHeldOut(bracket, curve, options);
+    return error.count > 0 ? error.mean_codes : -1.0;
+}
+
+/// Two frames, or too few pixels for groups: patches.
+ResponseRecovery recoverFromPatches(const Bracket& bracket, const ResponseOptions& options)
+{
+    const auto channels = detail::observePatches(bracket, options.samples);
+    std::array<CodeReach, 3> reaches{};
+    std::size_t most = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        most = std::max(most, channels[c].size());
+        if (channels[c].size() >= kFewestPatches) reaches[c] = detail::reachOf(channels[c]);
+    }
+    if (most < kFewestPatches)
+        return notRecoverable(
+            bracket,
+            fmt::format("only {} places are neither clipped nor black in two exposures", most));
+    std::array<LogCurve, 3> log_curves{};
+    ResponseRecovery recovery;
+    parallelFor(0, 3, [&](std::int64_t channel) {
+        const auto c = static_cast<std::size_t>(channel);
+        if (channels[c].size() < kFewestPatches) return;
+        const auto solution = detail::solveResponse(channels[c], options.smoothness);
+        log_curves[c] = solution.log_curve;
+        recovery.residual[c] = solution.residual;
+    });
+    if (!makeCurve(log_curves, reaches, ResponseMethod::Debevec, recovery.curve))
+        return notRecoverable(bracket, "the equations have no solution");
+    recovery.method = ResponseMethod::Debevec;
+    recovery.exposure_scale.assign(bracket.frames.size(), 1.0);
+    recovery.held_out_error_codes =
+        judge(bracket, recovery.curve, recovery.exposure_scale, kJudgedPixels);
+    if (options.method != ResponseMethod::Auto && options.method != ResponseMethod::Debevec)
+        recovery.findings.push_back(
             {Severity::Info,
-             "response-partly-extrapolated",
-             fmt::format("the bracket shows codes {:.0f} to {:.0f} in all channels; the camera's "
-                         "response outside is extrapolated",
-                         low,
-                         high)});
+             "response-method-failed",
+             fmt::format("method {} needs more exposures or pixels than this bracket has; {} was "
+                         "used",
+                         responseMethodName(options.method),
+                         responseMethodName(recovery.method))});
+    append(recovery.findings, detail::reachFindings(reaches));
+    return recovery;
+}
+
+std::array<PixelGroups, 3> groupChannels(
+    const std::array<std::vector<detail::FrameTriple>, 3>& triples)
+{
+    std::array<PixelGroups, 3> groups;
+    parallelFor(0, 3, [&](std::int64_t channel) {
+        const auto c = static_cast<std::size_t>(channel);
+        groups[c] = detail::groupByCode(triples[c]);
+        if (groups[c].size() < kFewestGroups) groups[c].clear();
+    });
+    return groups;
+}
+
+/// What all methods start from.
+struct Evidence {
+    BracketPixels pixels;
+    std::array<PixelGroups, 3> groups;
+    std::array<CodeReach, 3> reaches{};
+    std::vector<double> log_exposures;  ///< refined
+    CurveFit smooth;                    ///< method Debevec: it also found the refinement
+    double moved = 0.0;                 ///< share of blocks dropped
+};
+
+std::vector<double> logExposures(const Bracket& bracket)
+{
+    std::vector<double> result;
+    for (const BracketFrame& frame : bracket.frames)
+        result.push_back(std::log(frame.relative_exposure));
+    return result;
+}
+
+/// Median step of the bracket, EV.
+double medianStep(const std::vector<double>& log_exposures)
+{
+    std::vector<double> steps;
+    for (std::size_t k = 0; k + 1 < log_exposures.size(); ++k)
+        steps.push_back((log_exposures[k] - log_exposures[k + 1]) / std::log(2.0));
+    std::ranges::sort(steps);
+    return steps[steps.size() / 2];
+}
+
+/// First solution, without the places that it shows to have moved.
+void solveSmooth(Evidence& evidence, const ResponseOptions& options)
+{
+    const double step = std::clamp(medianStep(evidence.log_exposures), kLeastStep, kMostStep);
+    const detail::CurveModel model =
+        detail::smoothModel(options.smoothness * kGroupSmoothness * std::pow(step, 6.0));
+    const auto solve = [&] {
+        evidence.smooth = detail::fitCurves(
+            evidence.groups, evidence.log_exposures, model, options.refine_exposures);
+    };
+    solve();
+    std::vector<double> refined = evidence.log_exposures;
+    for (std::size_t k = 0; k < refined.size(); ++k)
+        refined[k] += evidence.smooth.log_scale[k];
+    BracketPixels still = evidence.pixels;
+    const double moved = detail::dropMovedBlocks(still, evidence.smooth.decoder, refined);
+    if (moved >= kFewMoved && moved <= kMostMoved) {
+        std::array<PixelGroups, 3> groups = groupChannels(detail::countTriples(still));
+        // What is left must carry a curve wherever all did.
+        bool enough = true;
+        for (std::size_t c = 0; c < 3; ++c)
+            enough = enough && groups[c].empty() == evidence.groups[c].empty();
+        if (enough) {
+            evidence.moved = moved;
+            evidence.pixels = std::move(still);
+            evidence.groups = std::move(groups);
+            solve();
+        }
+    }
+    for (std::size_t k = 0; k < refined.size(); ++k)
+        evidence.log_exposures[k] += evidence.smooth.log_scale[k];
+    for (std::size_t c = 0; c < 3; ++c)
+        evidence.reaches[c] = detail::reachOf(evidence.groups[c]);
+}
+
+struct Candidate {
+    ResponseMethod method = ResponseMethod::Debevec;
+    ResponseCurve curve;
+    double error = -1.0;
+};
+
+std::optional<Candidate> tryMethod(const Evidence& evidence, ResponseMethod method)
+{
+    detail::Decoders decoders;
+    switch (method) {
+        case ResponseMethod::Auto:
+        case ResponseMethod::Debevec:
+            decoders = evidence.smooth.decoder;
+            break;
+        case ResponseMethod::Mitsunaga:
+            decoders = detail::fitPolynomials(evidence.groups, evidence.log_exposures);
+            break;
+        case ResponseMethod::Robertson:
+            decoders = detail::iterateTables(evidence.pixels, evidence.log_exposures);
+            break;
+        case ResponseMethod::Basis:
+            decoders = detail::fitCurves(
+                           evidence.groups, evidence.log_exposures, detail::basisModel(), false)
+                           .decoder;
+            break;
+    }
+    if (!decoders) return std::nullopt;
+    std::array<LogCurve, 3> log_curves{};
+    for (std::size_t c = 0; c < 3; ++c)
+        log_curves[c] = detail::curveOfDecoder((*decoders)[c], evidence.pixels.rounding_variance);
+    Candidate candidate;
+    candidate.method = method;
+    if (!makeCurve(log_curves, evidence.reaches, method, candidate.curve)) return std::nullopt;
+    return candidate;
+}
+
+/// The best of all methods by held-out prediction, and the finding that says so.
+Candidate chooseMethod(const Bracket& bracket,
+                       const Evidence& evidence,
+                       const std::vector<double>& scale,
+                       Findings& findings)
+{
+    std::optional<Candidate> best;
+    std::string errors;
+    for (const ResponseMethod method : {ResponseMethod::Debevec,
+                                        ResponseMethod::Basis,
+                                        ResponseMethod::Mitsunaga,
+                                        ResponseMethod::Robertson}) {
+        std::optional<Candidate> candidate = tryMethod(evidence, method);
+        if (!errors.empty()) errors += ", ";
+        errors += responseMethodName(method);
+        if (!candidate) {
+            errors += " none";
+            continue;
+        }
+        candidate->error = judge(bracket, candidate->curve, scale, kJudgedPixels);
+        errors += fmt::format(" {:.3f}", candidate->error);
+        if (!best || (candidate->error >= 0.0 && candidate->error < kClearlyBetter * best->error))
+            best = std::move(candidate);
+    }
+    INSITU_CHECK(best.has_value(), "no curve although the smooth one is finite");
+    findings.push_back(
+        {Severity::Info,
+         "response-method-chosen",
+         fmt::format("method {}; mean error of codes of exposures predicted from the "
+                     "others: {}",
+                     responseMethodName(best->method),
+                     errors)});
+    return *std::move(best);
+}
+
+ResponseRecovery recoverFromGroups(const Bracket& bracket,
+                                   Evidence evidence,
+                                   const ResponseOptions& options)
+{
+    solveSmooth(evidence, options);
+    ResponseRecovery recovery;
+    for (const double log_scale : evidence.smooth.log_scale)
+        recovery.exposure_scale.push_back(std::exp(log_scale));
+    recovery.residual = evidence.smooth.residual;
+    std::optional<Candidate> chosen = tryMethod(evidence, ResponseMethod::Debevec);
+    if (!chosen) return notRecoverable(bracket, "the equations have no solution");
+    if (options.method == ResponseMethod::Auto) {
+        chosen = chooseMethod(bracket, evidence, recovery.exposure_scale, recovery.findings);
+    } else if (options.method != ResponseMethod::Debevec) {
+        if (std::optional<Candidate> asked = tryMethod(evidence, options.method)) {
+            chosen = std::move(asked);
+        } else {
+            recovery.findings.push_back({Severity::Info,
+                                         "response-method-failed",
+                                         fmt::format("method {} finds no increasing curve; {} was "
+                                                     "used",
+                                                     responseMethodName(options.method),
+                                                     responseMethodName(chosen->method))});
+        }
+    }
+    recovery.method = chosen->method;
+    recovery.held_out_error_codes =
+        chosen->error >= 0.0
+            ? chosen->error
+            : judge(bracket, chosen->curve, recovery.exposure_scale, kJudgedPixels);
+    recovery.curve = std::move(chosen->curve);
+    if (evidence.moved > 0.0)
+        recovery.findings.push_back(
+            {Severity::Info,
+             "response-moved-places",
+             fmt::format("in {:.1f} % of the picture the exposures disagree "
+                         "(something moved, or they are not aligned); the "
+                         "response was found without these places",
+                         100.0 * evidence.moved)});
+    append(recovery.findings, detail::reachFindings(evidence.reaches));
+    append(recovery.findings, detail::exposureFindings(bracket, evidence.smooth.log_scale));
+    return recovery;
 }
 
 void checkOptions(const ResponseOptions& options)
@@ -157,6 +327,23 @@ void checkOptions(const ResponseOptions& options)
 }
 
 }  // namespace
+
+const char* responseMethodName(ResponseMethod method)
+{
+    switch (method) {
+        case ResponseMethod::Auto:
+            return "auto";
+        case ResponseMethod::Debevec:
+            return "debevec";
+        case ResponseMethod::Mitsunaga:
+            return "mitsunaga";
+        case ResponseMethod::Robertson:
+            return "robertson";
+        case ResponseMethod::Basis:
+            return "basis";
+    }
+    return "debevec";
+}
 
 Findings ResponseOptions::validate() const
 {
@@ -177,37 +364,26 @@ ResponseRecovery recoverResponse(const Bracket& bracket, const ResponseOptions& 
     checkOptions(options);
     INSITU_CHECK(!bracket.frames.empty(), "empty bracket");
     if (hasFinding(bracket.findings, "bracket-single-exposure"))
-        return notRecoverable("all images have the same exposure");
+        return notRecoverable(bracket, "all images have the same exposure");
 
-    const std::vector<ResponseSample> samples =
-        detail::selectResponseSamples(bracket, options.samples);
-    std::array<std::vector<PatchObservations>, 3> channels;
-    for (std::size_t c = 0; c < 3; ++c) {
-        channels[c] = observeChannel(bracket, samples, static_cast<int>(c));
-        if (channels[c].size() < kFewestPatches)
-            return notRecoverable(
-                fmt::format("only {} places are neither clipped nor black in two "
-                            "exposures",
-                            channels[c].size()));
-    }
-    std::array<ResponseSolution, 3> solutions;
-    parallelFor(0, 3, [&](std::int64_t c) {
-        const auto channel = static_cast<std::size_t>(c);
-        solutions[channel] = detail::solveResponse(channels[channel], options.smoothness);
-    });
-
+    if (bracket.frames.size() < 3) return recoverFromPatches(bracket, options);
+    Evidence evidence;
+    evidence.pixels = detail::readBracketPixels(bracket);
+    evidence.log_exposures = logExposures(bracket);
+    const auto triples = detail::countTriples(evidence.pixels);
+    const Findings order = detail::orderFindings(bracket, triples[1]);
+    evidence.groups = groupChannels(triples);
+    std::size_t channels = 0;
+    for (const PixelGroups& groups : evidence.groups)
+        channels += groups.empty() ? 0 : 1;
     ResponseRecovery recovery;
-    recovery.curve.source = "debevec";
-    for (std::size_t c = 0; c < 3; ++c) {
-        LogCurve& log_curve = solutions[c].log_curve;
-        for (const double value : log_curve)
-            if (!std::isfinite(value)) return notRecoverable("the equations have no solution");
-        makeIncreasing(log_curve);
-        for (std::size_t z = 0; z < log_curve.size(); ++z)
-            recovery.curve.exposure[c][z] = std::exp(log_curve[z] - log_curve[128]);
-        recovery.residual[c] = solutions[c].residual;
-    }
-    reportReach(channels, recovery.findings);
+    if (order.size() + 1 == bracket.frames.size())
+        recovery = notRecoverable(bracket, "no image is brighter than the next shorter one");
+    else if (channels == 0)
+        recovery = recoverFromPatches(bracket, options);
+    else
+        recovery = recoverFromGroups(bracket, std::move(evidence), options);
+    append(recovery.findings, order);
     return recovery;
 }
 

@@ -95,7 +95,7 @@ TEST(RecoverResponse, TableIsNormalisedPositiveAndStrictlyIncreasing)
     camera.read_variance = 1e-5;
     camera.shot_variance = 1e-3;
     const ResponseRecovery recovery = recoverResponse(photograph(scene(), kTwoEv, camera), {});
-    EXPECT_EQ(recovery.curve.source, "debevec");
+    EXPECT_EQ(recovery.curve.source, responseMethodName(recovery.method));
     for (const auto& table : recovery.curve.exposure) {
         EXPECT_EQ(table[128], 1.0);
         EXPECT_GE(table[0], 0.0);
