@@ -98,7 +98,7 @@ Entry runPfstools(const Bracket& bracket)
     std::string list;
     for (std::size_t k = 0; k < bracket.frames.size(); ++k) {
         const fs::path file = folder / fmt::format("frame_{:02}.png", k);
-        writePng(file, bracket.frames[k].image);
+        writeEncoded(file, bracket.frames[k].image);
         list += fmt::format(
             "{} {} 8 100 0\n", file.string(), 1.0 / bracket.frames[k].relative_exposure);
     }
@@ -246,8 +246,9 @@ Bracket photograph(const Image<Rgb>& scene,
                         std::sqrt(electrons + sensor.read_noise * sensor.read_noise);
                     const double e = std::clamp((electrons + noise) / sensor.full_well, 0.0, 1.0);
                     const double place = std::sqrt(e) * static_cast<double>(kSteps);
-                    frame.image.codes(x, y)[c] = static_cast<std::uint16_t>(std::lround(
-                        code[static_cast<std::size_t>(c)][static_cast<std::size_t>(place)]));
+                    frame.image.codes(x, y)[c] = static_cast<std::uint16_t>(
+                        std::lround(code[static_cast<std::size_t>(c)]
+                                        [static_cast<std::size_t>(std::lround(place))]));
                 }
             }
         }

@@ -21,10 +21,13 @@ constexpr double kTail = 0.02;
 constexpr std::size_t kJunction = 32;
 /// Corrections of ln exposure beyond rounding of nominal times: the list is wrong.
 constexpr double kMismatch = 0.15;
-/// Two frames whose codes differ by less than this on average are the same picture.
-constexpr double kSamePicture = 0.5;
+/// Two frames whose codes differ by less than this share are the same picture; codes below
+/// kShowsFrom may be black, fewer pixels than kFewestCompared say nothing.
+constexpr double kSamePicture = 0.03;
+constexpr int kShowsFrom = 48;
+constexpr double kFewestCompared = 200.0;
 /// Neighbours whose exposures (ln) differ by less may look the same.
-constexpr double kVisibleRatio = 0.1;
+constexpr double kVisibleRatio = 0.35;
 
 double inEv(double log_ratio)
 {
@@ -108,19 +111,21 @@ std::string describe(const Bracket& bracket, std::size_t frame, double log_scale
                        inEv(log_scale));
 }
 
-/// Mean difference of the codes of two frames where both show something.
-double meanDifference(const JointCounts& counts)
+/// Whether the second frame is hardly darker than the first where that shows something.
+bool hardlyDarker(const JointCounts& counts)
 {
+    double difference = 0.0;
     double sum = 0.0;
     double total = 0.0;
-    for (int a = 10; a < 245; ++a) {
-        for (int b = 10; b < 245; ++b) {
+    for (int a = kShowsFrom; a < 245; ++a) {
+        for (int b = 0; b < kCodes; ++b) {
             const double n = counts[static_cast<std::size_t>(a * kCodes + b)];
-            sum += n * (a - b);
+            difference += n * (a - b);
+            sum += n * a;
             total += n;
         }
     }
-    return total > 0.0 ? sum / total : kCodes;
+    return total >= kFewestCompared && difference < kSamePicture * sum;
 }
 
 }  // namespace
@@ -177,6 +182,19 @@ void borrowShapes(std::array<LogCurve, 3>& curves, const std::array<CodeReach, 3
         for (std::size_t z = 0; z < sum.size() && channels > 0.0; ++z)
             curves[c][z] = sum[z] / channels;
     }
+}
+
+void applyFloor(LogCurve& curve, int floor, double lowest)
+{
+    if (floor <= 0) return;
+    const auto black = static_cast<std::size_t>(floor);
+    const std::size_t from =
+        std::clamp(static_cast<std::size_t>(lowest), black + 2, curve.size() - 2);
+    for (std::size_t z = black + 1; z < from; ++z)
+        curve[z] = curve[from] +
+                   std::log(static_cast<double>(z - black) / static_cast<double>(from - black));
+    for (std::size_t z = black + 1; z-- > 0;)
+        curve[z] = curve[z + 1] - std::log(2.0);
 }
 
 void makeIncreasing(LogCurve& curve)
@@ -268,19 +286,18 @@ Findings orderFindings(const Bracket& bracket, const std::vector<FrameTriple>& t
         const BracketFrame& longer = bracket.frames[k];
         const BracketFrame& shorter = bracket.frames[k + 1];
         const double nominal = std::log(longer.relative_exposure / shorter.relative_exposure);
-        const double difference = meanDifference(k < triples.size() ? triples[k].first_middle
-                                                                    : triples.back().middle_last);
-        if (nominal < kVisibleRatio || difference > kSamePicture) continue;
-        findings.push_back(
-            {Severity::Warning,
-             "bracket-exposure-mismatch",
-             fmt::format("{} is given {:.2f} EV more than {}, but is {} in the picture (by {:+.1f} "
-                         "codes on average): check the list of exposures",
-                         longer.name,
-                         inEv(nominal),
-                         shorter.name,
-                         difference < -kSamePicture ? "darker" : "the same",
-                         difference)});
+        const JointCounts& counts =
+            k < triples.size() ? triples[k].first_middle : triples.back().middle_last;
+        if (nominal < kVisibleRatio || !hardlyDarker(counts)) continue;
+        findings.push_back({Severity::Warning,
+                            "bracket-exposure-mismatch",
+                            fmt::format("{} is given {:.4g}, {} {:.4g} ({:+.2f} EV), but it is not "
+                                        "darker in the picture: check the list of exposures",
+                                        longer.name,
+                                        longer.relative_exposure,
+                                        shorter.name,
+                                        shorter.relative_exposure,
+                                        -inEv(nominal))});
     }
     return findings;
 }

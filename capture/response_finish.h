@@ -22,6 +22,10 @@ struct CodeReach {
 /// without reach is the others' mean.
 void borrowShapes(std::array<LogCurve, 3>& curves, const std::array<CodeReach, 3>& reaches);
 
+/// Brings the curve to nothing at the level of black (a code, 0: none): along a straight line from
+/// `lowest`, the lowest code that samples reach; halves it for each code below.
+void applyFloor(LogCurve& curve, int floor, double lowest);
+
 /// Isotonic regression (pool adjacent violators, [BarBrunk72]) and then a least step, so that the
 /// table is strictly increasing.
 void makeIncreasing(LogCurve& curve);

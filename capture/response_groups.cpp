@@ -41,6 +41,14 @@ constexpr double kEndShare = 1e-3;
 /// Share of the pixels of like brightness that are taken as flat, and the brightness steps.
 constexpr double kFlatShare = 0.7;
 constexpr std::size_t kBrightnessSteps = 64;
+/// Share of a frame's pixels that are surely dark, if any is, for the level of black (half of them
+/// is tried first); the codes at which it may lie; how much they may differ in two frames whose
+/// exposures differ by kVisibleRatio.
+constexpr double kDarkShare = 0.2;
+constexpr int kLowestFloor = 4;
+constexpr int kHighestFloor = 48;
+constexpr double kSameBlack = 0.1;
+constexpr double kVisibleRatio = 1.4;
 
 /// Where a tile comes from: its top-left pixel in the bracket's frames.
 struct Tile {
@@ -220,6 +228,36 @@ JointCounts countPair(
     return counts;
 }
 
+/// Quantile of the codes of one channel of a frame.
+int quantileOf(const std::vector<std::uint8_t>& codes, double share)
+{
+    std::array<std::size_t, kCodes> histogram{};
+    for (const std::uint8_t code : codes)
+        ++histogram[code];
+    double left = share * static_cast<double>(codes.size());
+    int z = 0;
+    while (z + 1 < kCodes && left > static_cast<double>(histogram[static_cast<std::size_t>(z)]))
+        left -= static_cast<double>(histogram[static_cast<std::size_t>(z++)]);
+    return z;
+}
+
+/// The level of black: where the darkest pixels of the two shortest frames do not differ although
+/// the exposures do.
+int findFloor(const Bracket& bracket, const BracketPixels& pixels, std::size_t c)
+{
+    const std::size_t last = bracket.frames.size() - 1;
+    const double ratio =
+        bracket.frames[last - 1].relative_exposure / bracket.frames[last].relative_exposure;
+    if (ratio < kVisibleRatio) return 0;
+    for (const double share : {0.5, kDarkShare}) {
+        const int dark = quantileOf(pixels.frames[last].codes[c], share);
+        const int longer = quantileOf(pixels.frames[last - 1].codes[c], share);
+        if (dark < kLowestFloor || dark > kHighestFloor) continue;
+        if (longer - dark <= kSameBlack * dark) return dark;
+    }
+    return 0;
+}
+
 JointCounts transposed(const JointCounts& counts)
 {
     JointCounts result(counts.size());
@@ -230,21 +268,23 @@ JointCounts transposed(const JointCounts& counts)
 }
 
 /// The view of one frame; nothing when too few pixels remain or too many are at the ends.
-std::optional<GroupView> viewOf(const std::uint32_t* counts, std::size_t frame)
+std::optional<GroupView> viewOf(const std::uint32_t* counts, std::size_t frame, int floor)
 {
     int low = -1;
     int high = -1;
     double total = 0.0;
+    double bottom = 0.0;
     double top = 0.0;
     for (int z = 0; z < kCodes; ++z) {
         if (counts[z] == 0) continue;
         if (low < 0) low = z;
         high = z;
         total += counts[z];
+        if (z <= floor) bottom += counts[z];
         if (z >= kNearClip) top += counts[z];
     }
     if (total < kFewestPixels) return std::nullopt;
-    if (counts[0] > kEndShare * total || top > kEndShare * total) return std::nullopt;
+    if (bottom > kEndShare * total || top > kEndShare * total) return std::nullopt;
     GroupView view;
     view.frame = static_cast<int>(frame);
     view.low = low;
@@ -256,15 +296,16 @@ std::optional<GroupView> viewOf(const std::uint32_t* counts, std::size_t frame)
 
 /// Groups by the codes of one frame; `a` and `b` count its codes with those of the two others.
 void addGroups(PixelGroups& groups,
+               int floor,
                const JointCounts& a,
                std::size_t frame_a,
                const JointCounts& b,
                std::size_t frame_b)
 {
     for (std::size_t code = 1; code + 1 < kCodes; ++code) {
-        std::optional<GroupView> view_a = viewOf(&a[code * kCodes], frame_a);
+        std::optional<GroupView> view_a = viewOf(&a[code * kCodes], frame_a, floor);
         if (!view_a) continue;
-        std::optional<GroupView> view_b = viewOf(&b[code * kCodes], frame_b);
+        std::optional<GroupView> view_b = viewOf(&b[code * kCodes], frame_b, floor);
         if (!view_b) continue;
         groups.push_back({{*std::move(view_a), *std::move(view_b)}});
     }
@@ -288,6 +329,9 @@ BracketPixels readBracketPixels(const Bracket& bracket)
     pixels.rounding_variance =
         bracket.frames.front().image.max_code == 255 ? 1.0 / 12.0 : 1.0 / 6.0;
     rejectEdges(pixels);
+    if (bracket.frames.size() >= 2)
+        for (std::size_t c = 0; c < 3; ++c)
+            pixels.floor[c] = findFloor(bracket, pixels, c);
     return pixels;
 }
 
@@ -308,15 +352,16 @@ std::array<std::vector<FrameTriple>, 3> countTriples(const BracketPixels& pixels
     return triples;
 }
 
-PixelGroups groupByCode(const std::vector<FrameTriple>& triples)
+PixelGroups groupByCode(const std::vector<FrameTriple>& triples, int floor)
 {
     PixelGroups groups;
     for (std::size_t k = 0; k < triples.size(); ++k) {
         const FrameTriple& triple = triples[k];
         const JointCounts middle_first = transposed(triple.first_middle);
-        addGroups(groups, triple.first_middle, k + 1, triple.first_last, k + 2);
-        addGroups(groups, middle_first, k, triple.middle_last, k + 2);
-        addGroups(groups, transposed(triple.first_last), k, transposed(triple.middle_last), k + 1);
+        addGroups(groups, floor, triple.first_middle, k + 1, triple.first_last, k + 2);
+        addGroups(groups, floor, middle_first, k, triple.middle_last, k + 2);
+        addGroups(
+            groups, floor, transposed(triple.first_last), k, transposed(triple.middle_last), k + 1);
     }
     return groups;
 }

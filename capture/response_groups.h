@@ -26,6 +26,9 @@ struct BracketPixels {
     int height = 0;
     std::vector<CodePlanes> frames;
     std::vector<std::uint8_t> usable;  ///< 1: no edge, and nothing moved here
+    /// Code by channel at and below which nothing is seen: 0, or the level at which a scan or a
+    /// camera's black lies.
+    std::array<int, 3> floor{};
     /// Variance of code - value, codes^2: rounding, or the dither that 16-bit codes get.
     double rounding_variance = 0.0;
 };
@@ -62,6 +65,7 @@ struct FrameTriple {
 /// One triple for each frame but the last two, in order, by channel. The bracket has three frames
 /// or more.
 [[nodiscard]] std::array<std::vector<FrameTriple>, 3> countTriples(const BracketPixels& pixels);
-[[nodiscard]] PixelGroups groupByCode(const std::vector<FrameTriple>& triples);
+/// `floor` of the channel as BracketPixels::floor.
+[[nodiscard]] PixelGroups groupByCode(const std::vector<FrameTriple>& triples, int floor);
 
 }  // namespace insitu::detail

@@ -34,16 +34,21 @@ constexpr std::size_t kFewestGroups = 24;
 constexpr double kGroupSmoothness = 0.16;
 /// Steps of the bracket that smoothness is scaled for, EV: see smoothModel.
 constexpr double kLeastStep = 1.0;
-constexpr double kMostStep = 2.5;
+constexpr double kMostStep = 2.0;
+constexpr double kLongStep = 1.5;
+constexpr double kBetterLoose = 0.95;
 /// Share of blocks in which something moved: below, they are not worth a second solution; above,
 /// it is not they that are wrong.
 constexpr double kFewMoved = 5e-4;
 constexpr double kMostMoved = 0.5;
 /// Pixels on which methods are compared.
 constexpr std::size_t kJudgedPixels = 4000;
-/// A method must be this much better than the ones before it to be chosen: below, pixels' noise
-/// decides.
-constexpr double kClearlyBetter = 0.9;
+/// How much better than the ones before it (as a factor) a method must be to be chosen. Prediction
+/// does not see errors that repeat with the bracket's step, and JPEG's own errors reward a curve
+/// that follows them: in truth room c, polynomials predict a tenth better and are five times as
+/// wrong. So the methods without a prior on the curve's shape must be clearly better.
+constexpr double kBetterBasis = 0.98;
+constexpr double kBetterWithoutPrior = 0.88;
 
 ResponseRecovery notRecoverable(const Bracket& bracket, const std::string& why)
 {
@@ -62,6 +67,7 @@ ResponseRecovery notRecoverable(const Bracket& bracket, const std::string& why)
 /// Makes the table; false when there is none.
 bool makeCurve(std::array<LogCurve, 3> log_curves,
                const std::array<CodeReach, 3>& reaches,
+               const std::array<int, 3>& floor,
                ResponseMethod method,
                ResponseCurve& curve)
 {
@@ -69,6 +75,7 @@ bool makeCurve(std::array<LogCurve, 3> log_curves,
     for (std::size_t c = 0; c < 3; ++c) {
         for (const double value : log_curves[c])
             if (!std::isfinite(value) || std::abs(value) > 80.0) return false;
+        detail::applyFloor(log_curves[c], floor[c], reaches[c].low);
         detail::makeIncreasing(log_curves[c]);
         for (std::size_t z = 0; z < log_curves[c].size(); ++z)
             curve.exposure[c][z] = std::exp(log_curves[c][z] - log_curves[c][128]);
@@ -77,6 +84,7 @@ bool makeCurve(std::array<LogCurve, 3> log_curves,
     return true;
 }
 
+/// -1 when there is nothing to predict.
 double judge(const Bracket& bracket,
              const ResponseCurve& curve,
              const std::vector<double>& scale,
@@ -112,7 +120,7 @@ ResponseRecovery recoverFromPatches(const Bracket& bracket, const ResponseOption
         log_curves[c] = solution.log_curve;
         recovery.residual[c] = solution.residual;
     });
-    if (!makeCurve(log_curves, reaches, ResponseMethod::Debevec, recovery.curve))
+    if (!makeCurve(log_curves, reaches, {}, ResponseMethod::Debevec, recovery.curve))
         return notRecoverable(bracket, "the equations have no solution");
     recovery.method = ResponseMethod::Debevec;
     recovery.exposure_scale.assign(bracket.frames.size(), 1.0);
@@ -131,12 +139,12 @@ ResponseRecovery recoverFromPatches(const Bracket& bracket, const ResponseOption
 }
 
 std::array<PixelGroups, 3> groupChannels(
-    const std::array<std::vector<detail::FrameTriple>, 3>& triples)
+    const std::array<std::vector<detail::FrameTriple>, 3>& triples, const std::array<int, 3>& floor)
 {
     std::array<PixelGroups, 3> groups;
     parallelFor(0, 3, [&](std::int64_t channel) {
         const auto c = static_cast<std::size_t>(channel);
-        groups[c] = detail::groupByCode(triples[c]);
+        groups[c] = detail::groupByCode(triples[c], floor[c]);
         if (groups[c].size() < kFewestGroups) groups[c].clear();
     });
     return groups;
@@ -187,7 +195,7 @@ void solveSmooth(Evidence& evidence, const ResponseOptions& options)
     BracketPixels still = evidence.pixels;
     const double moved = detail::dropMovedBlocks(still, evidence.smooth.decoder, refined);
     if (moved >= kFewMoved && moved <= kMostMoved) {
-        std::array<PixelGroups, 3> groups = groupChannels(detail::countTriples(still));
+        std::array<PixelGroups, 3> groups = groupChannels(detail::countTriples(still), still.floor);
         // What is left must carry a curve wherever all did.
         bool enough = true;
         for (std::size_t c = 0; c < 3; ++c)
@@ -203,6 +211,29 @@ void solveSmooth(Evidence& evidence, const ResponseOptions& options)
         evidence.log_exposures[k] += evidence.smooth.log_scale[k];
     for (std::size_t c = 0; c < 3; ++c)
         evidence.reaches[c] = detail::reachOf(evidence.groups[c]);
+}
+
+/// About kJudgedPixels of the pixels that inform the curves, side by side; where a frame is not
+/// clean its code is 255, which neither predicts nor is predicted.
+Bracket judgedPlaces(const Bracket& bracket, const BracketPixels& pixels)
+{
+    const std::size_t step = std::max<std::size_t>(1, pixels.usable.size() / kJudgedPixels);
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < pixels.usable.size(); i += step)
+        if (pixels.usable[i] != 0) places.push_back(i);
+    Bracket judged;
+    for (std::size_t k = 0; k < bracket.frames.size(); ++k) {
+        const detail::CodePlanes& planes = pixels.frames[k];
+        BracketFrame frame;
+        frame.relative_exposure = bracket.frames[k].relative_exposure;
+        frame.image.codes = Image<glm::u16vec3>(static_cast<int>(places.size()), 1);
+        for (std::size_t i = 0; i < places.size(); ++i)
+            for (std::size_t c = 0; c < 3; ++c)
+                frame.image.codes(static_cast<int>(i), 0)[static_cast<int>(c)] =
+                    planes.clean[places[i]] != 0 ? planes.codes[c][places[i]] : std::uint8_t{255};
+        judged.frames.push_back(std::move(frame));
+    }
+    return judged;
 }
 
 struct Candidate {
@@ -237,12 +268,13 @@ std::optional<Candidate> tryMethod(const Evidence& evidence, ResponseMethod meth
         log_curves[c] = detail::curveOfDecoder((*decoders)[c], evidence.pixels.rounding_variance);
     Candidate candidate;
     candidate.method = method;
-    if (!makeCurve(log_curves, evidence.reaches, method, candidate.curve)) return std::nullopt;
+    if (!makeCurve(log_curves, evidence.reaches, evidence.pixels.floor, method, candidate.curve))
+        return std::nullopt;
     return candidate;
 }
 
 /// The best of all methods by held-out prediction, and the finding that says so.
-Candidate chooseMethod(const Bracket& bracket,
+Candidate chooseMethod(const Bracket& places,
                        const Evidence& evidence,
                        const std::vector<double>& scale,
                        Findings& findings)
@@ -260,9 +292,10 @@ Candidate chooseMethod(const Bracket& bracket,
             errors += " none";
             continue;
         }
-        candidate->error = judge(bracket, candidate->curve, scale, kJudgedPixels);
+        candidate->error = judge(places, candidate->curve, scale, 0);
         errors += fmt::format(" {:.3f}", candidate->error);
-        if (!best || (candidate->error >= 0.0 && candidate->error < kClearlyBetter * best->error))
+        const double factor = method == ResponseMethod::Basis ? kBetterBasis : kBetterWithoutPrior;
+        if (!best || (candidate->error >= 0.0 && candidate->error < factor * best->error))
             best = std::move(candidate);
     }
     INSITU_CHECK(best.has_value(), "no curve although the smooth one is finite");
@@ -276,6 +309,29 @@ Candidate chooseMethod(const Bracket& bracket,
     return *std::move(best);
 }
 
+/// Smoothness for long steps is stiff. The one for 1 EV replaces the smooth one when it
+/// predicts clearly better: a strong shoulder that the prior does not allow for.
+void loosen(const Bracket& places, Evidence& evidence, const ResponseOptions& options)
+{
+    const double step = medianStep(evidence.log_exposures);
+    if (step < kLongStep) return;
+    Evidence loose = evidence;
+    loose.smooth = detail::fitCurves(evidence.groups,
+                                     evidence.log_exposures,
+                                     detail::smoothModel(options.smoothness * kGroupSmoothness),
+                                     false);
+    loose.smooth.log_scale = evidence.smooth.log_scale;
+    const std::optional<Candidate> stiff = tryMethod(evidence, ResponseMethod::Debevec);
+    const std::optional<Candidate> other = tryMethod(loose, ResponseMethod::Debevec);
+    if (!stiff || !other) return;
+    std::vector<double> scale;
+    for (const double log_scale : evidence.smooth.log_scale)
+        scale.push_back(std::exp(log_scale));
+    if (judge(places, other->curve, scale, 0) <
+        kBetterLoose * judge(places, stiff->curve, scale, 0))
+        evidence.smooth = std::move(loose.smooth);
+}
+
 ResponseRecovery recoverFromGroups(const Bracket& bracket,
                                    Evidence evidence,
                                    const ResponseOptions& options)
@@ -284,11 +340,13 @@ ResponseRecovery recoverFromGroups(const Bracket& bracket,
     ResponseRecovery recovery;
     for (const double log_scale : evidence.smooth.log_scale)
         recovery.exposure_scale.push_back(std::exp(log_scale));
+    const Bracket places = judgedPlaces(bracket, evidence.pixels);
+    loosen(places, evidence, options);
     recovery.residual = evidence.smooth.residual;
     std::optional<Candidate> chosen = tryMethod(evidence, ResponseMethod::Debevec);
     if (!chosen) return notRecoverable(bracket, "the equations have no solution");
     if (options.method == ResponseMethod::Auto) {
-        chosen = chooseMethod(bracket, evidence, recovery.exposure_scale, recovery.findings);
+        chosen = chooseMethod(places, evidence, recovery.exposure_scale, recovery.findings);
     } else if (options.method != ResponseMethod::Debevec) {
         if (std::optional<Candidate> asked = tryMethod(evidence, options.method)) {
             chosen = std::move(asked);
@@ -302,10 +360,9 @@ ResponseRecovery recoverFromGroups(const Bracket& bracket,
         }
     }
     recovery.method = chosen->method;
-    recovery.held_out_error_codes =
-        chosen->error >= 0.0
-            ? chosen->error
-            : judge(bracket, chosen->curve, recovery.exposure_scale, kJudgedPixels);
+    recovery.held_out_error_codes = chosen->error >= 0.0
+                                        ? chosen->error
+                                        : judge(places, chosen->curve, recovery.exposure_scale, 0);
     recovery.curve = std::move(chosen->curve);
     if (evidence.moved > 0.0)
         recovery.findings.push_back(
@@ -372,7 +429,7 @@ ResponseRecovery recoverResponse(const Bracket& bracket, const ResponseOptions& 
     evidence.log_exposures = logExposures(bracket);
     const auto triples = detail::countTriples(evidence.pixels);
     const Findings order = detail::orderFindings(bracket, triples[1]);
-    evidence.groups = groupChannels(triples);
+    evidence.groups = groupChannels(triples, evidence.pixels.floor);
     std::size_t channels = 0;
     for (const PixelGroups& groups : evidence.groups)
         channels += groups.empty() ? 0 : 1;
