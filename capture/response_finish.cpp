@@ -10,6 +10,8 @@ namespace insitu::detail {
 
 namespace {
 
+/// The next code's exposure over that of the level of black, which is any lower one.
+constexpr double kBlackRatio = 1000.0;
 /// Smallest step of ln(exposure) between codes after the monotone fix.
 constexpr double kSmallestStep = 1e-5;
 /// Codes that every channel's samples should reach; else the curve's ends are extrapolated.
@@ -193,7 +195,8 @@ void applyFloor(LogCurve& curve, int floor, double lowest)
     for (std::size_t z = black + 1; z < from; ++z)
         curve[z] = curve[from] +
                    std::log(static_cast<double>(z - black) / static_cast<double>(from - black));
-    for (std::size_t z = black + 1; z-- > 0;)
+    curve[black] = curve[black + 1] - std::log(kBlackRatio);
+    for (std::size_t z = black; z-- > 0;)
         curve[z] = curve[z + 1] - std::log(2.0);
 }
 

@@ -36,7 +36,7 @@ constexpr double kGroupSmoothness = 0.16;
 constexpr double kLeastStep = 1.0;
 constexpr double kMostStep = 2.0;
 constexpr double kLongStep = 1.5;
-constexpr double kBetterLoose = 0.95;
+constexpr double kBetterLoose = 0.98;
 /// Share of blocks in which something moved: below, they are not worth a second solution; above,
 /// it is not they that are wrong.
 constexpr double kFewMoved = 5e-4;
