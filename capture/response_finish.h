@@ -23,7 +23,8 @@ struct CodeReach {
 void borrowShapes(std::array<LogCurve, 3>& curves, const std::array<CodeReach, 3>& reaches);
 
 /// Brings the curve to nothing at the level of black (a code, 0: none): along a straight line from
-/// `lowest`, the lowest code that samples reach; below, entries go on falling, to increase strictly.
+/// `lowest`, the lowest code that samples reach; below, entries go on falling, to increase
+/// strictly.
 void applyFloor(LogCurve& curve, int floor, double lowest);
 
 /// Isotonic regression (pool adjacent violators, [BarBrunk72]) and then a least step, so that the

@@ -20,10 +20,8 @@ struct CurveModel {
 };
 
 struct CurveFit {
-    std::array<Eigen::VectorXd, 3> coefficients;
     std::array<LogCurve, 3> decoder{};  ///< right on average; see curveOfDecoder
     std::array<double, 3> residual{};   ///< RMS of ln exposure, weighted
-    std::array<double, 3> spread{};     ///< what remains when the pixels' noise is averaged out
     std::vector<double> log_scale;      ///< ln of the correction of each frame's exposure
 };
 

@@ -29,6 +29,8 @@ constexpr int kRounds = 4;
 /// What averaging leaves of a group's disagreement, ln.
 constexpr double kSpread = 0.01;
 constexpr double kRidge = 1e-10;
+/// A polynomial that does not rise from here on is no curve. Code.
+constexpr std::size_t kHighestStart = 64;
 
 /// Mean powers of the codes of two views of a group, over the frames' exposures.
 struct PowerPair {
@@ -150,7 +152,7 @@ Decoders fitPolynomials(const std::array<PixelGroups, 3>& groups,
         std::size_t lowest = values.size() - 1;
         while (lowest > 1 && values[lowest - 1] > 0.0 && values[lowest - 1] < values[lowest])
             --lowest;
-        found[c] = lowest <= 64 && std::isfinite(values[128]);
+        found[c] = lowest <= kHighestStart && std::isfinite(values[128]);
         if (!found[c]) return;
         for (std::size_t z = 0; z < values.size(); ++z) {
             const double below =

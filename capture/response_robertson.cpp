@@ -21,6 +21,9 @@ constexpr int kMostRounds = 40;
 constexpr double kConverged = 2e-4;
 /// A code seen less often than this counts as not seen.
 constexpr double kFewest = 5.0;
+/// Fewer codes carry no table; so many of them give the power law beyond the ends.
+constexpr std::size_t kFewestCodes = 16;
+constexpr std::size_t kEndCodes = 8;
 
 std::array<double, kCodes> bell()
 {
@@ -52,7 +55,7 @@ bool fillGaps(LogCurve& curve, const std::array<double, kCodes>& seen)
     std::vector<std::size_t> known;
     for (std::size_t z = 1; z + 1 < seen.size(); ++z)
         if (seen[z] >= kFewest) known.push_back(z);
-    if (known.size() < 16) return false;
+    if (known.size() < kFewestCodes) return false;
     const auto place = [](std::size_t z) { return std::log(static_cast<double>(z) + 0.5); };
     std::size_t next = 1;
     for (std::size_t z = 0; z < curve.size(); ++z) {
@@ -60,7 +63,7 @@ bool fillGaps(LogCurve& curve, const std::array<double, kCodes>& seen)
             ++next;
         if (seen[z] >= kFewest && z > 0 && z + 1 < seen.size()) continue;
         const bool beyond = z < known.front() || z > known.back();
-        const std::size_t reach = std::min<std::size_t>(known.size() - 1, 8);
+        const std::size_t reach = std::min(known.size() - 1, kEndCodes);
         const std::size_t a = !beyond             ? known[next - 1]
                               : z < known.front() ? known.front()
                                                   : known[known.size() - 1 - reach];

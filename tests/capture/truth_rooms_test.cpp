@@ -75,7 +75,7 @@ TEST_P(TruthRooms, ResponseIsRecovered)
     const TruthRoom room = readTruthRoom(GetParam());
     const ResponseRecovery recovery = recoverResponse(room.bracket, {});
     for (std::size_t c = 0; c < 3; ++c)
-        EXPECT_LT(curveErrorEv(recovery.curve, room.curve, c, 24, 220), 0.035) << c;
+        EXPECT_LT(curveErrorEv(recovery.curve, room.curve, c, 24, 220), 0.015) << c;
 }
 
 // Rooms a and b: the map gives the irradiance of the truth panorama, after one scale per channel
