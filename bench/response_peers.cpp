@@ -280,9 +280,10 @@ double errorEv(const ResponseCurve& curve, const Response& response, std::size_t
     return std::sqrt(std::max(squares / count - sum * sum / (count * count), 0.0));
 }
 
-/// The variance bound of one code's ln exposure, were all radiances known: Poisson, read noise and
-/// rounding, by all pixels that show the code. No method can know the radiances, so none reaches
-/// it; it is what the pixels hold. RMS over codes 5 to 250, EV, the worst channel.
+/// The Cramér–Rao bound of a free table, were all radiances known: Poisson, read noise and
+/// rounding, by all pixels that show a code. RMS over codes 5 to 250, EV, the worst channel.
+/// Unknown radiances make it harder; a smooth curve, for which neighbouring codes speak too, may be
+/// below it.
 double knownRadianceBound(const Bracket& bracket, const Response& response, Sensor sensor)
 {
     double worst = 0.0;
