@@ -195,6 +195,16 @@ std::vector<NamedResponse> responses()
                                           0.85 + 0.05 * static_cast<double>(c));
              return std::pow(power / (power + half) * (1.0 + half), 0.85);
          }},
+        {"filmic, a long toe",  // J. Hable's curve
+         [](std::size_t c, double e) {
+             const auto curve = [](double x) {
+                 constexpr double kToe = 0.01 / 0.30;
+                 return (x * (0.22 * x + 0.03) + 0.002) / (x * (0.22 * x + 0.3) + 0.06) - kToe;
+             };
+             const double white = 8.0 + 2.0 * static_cast<double>(c);
+             return std::pow(std::max(curve(white * e), 0.0) / curve(white),
+                             0.5 + 0.03 * static_cast<double>(c));
+         }},
         {"toe and shoulder of a film",
          [](std::size_t c, double e) {
              const double t = 2.0 + 0.5 * static_cast<double>(c);

@@ -16,9 +16,8 @@ namespace {
 
 /// Fewer groups of pixels than this cannot carry a curve.
 constexpr std::size_t kFewestGroups = 24;
-/// Scale of ResponseOptions::smoothness for groups of pixels and a bracket of 1 EV steps. In clean
-/// brackets anything from a tenth to twice as much does equally well, in the truth rooms (2 EV)
-/// from a third to three times as much.
+/// Scale of ResponseOptions::smoothness for groups of pixels and a bracket of 1 EV steps. Chosen on
+/// synthetic brackets of one environment and on the truth rooms, which are also what is reported.
 constexpr double kGroupSmoothness = 0.16;
 /// Steps of the bracket that smoothness is scaled for, EV: see smoothModel.
 constexpr double kLeastStep = 1.0;
@@ -35,6 +34,7 @@ constexpr std::size_t kJudgedPixels = 4000;
 /// does not see errors that repeat with the bracket's step, and JPEG's own errors reward a curve
 /// that follows them: in truth room c, polynomials predict a tenth better and are five times as
 /// wrong. So the methods without a prior on the curve's shape must be clearly better.
+/// The numbers were chosen on the truth rooms and the three real brackets of response_peers.
 constexpr double kBetterBasis = 0.98;
 constexpr double kBetterWithoutPrior = 0.88;
 

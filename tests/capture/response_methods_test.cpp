@@ -95,9 +95,9 @@ void PrintTo(const MethodCase& c, std::ostream* os)
 
 class Methods : public testing::TestWithParam<MethodCase> {};
 
-// The limits are about twice what is measured; what separates the methods is their model: a table
-// of 12 000 pixels is noisier than a spline of all, and a polynomial bends where the curve does
-// not.
+// What separates the methods is their model: a table of 12 000 pixels is noisier than a spline of
+// all, and a polynomial bends where the curve does not. The limits were set by hand, not from what
+// is measured.
 TEST_P(Methods, RecoverAKnownCurve)
 {
     const SyntheticCamera camera = cameraWith(GetParam().curve);
@@ -289,8 +289,9 @@ TEST_P(HardBrackets, GiveASaneCurve)
             << c;
 }
 
-// Limits about twice what is measured. Exposures 5 EV apart share the curve's ends only: between
-// them smoothness alone tells. ISO 6400: 1200 electrons at full scale, 4 electrons of read noise.
+// Limits set by hand, not from what is measured. Exposures 5 EV apart share the curve's ends only:
+// between them smoothness alone tells. ISO 6400: 1200 electrons at full scale, 4 electrons of read
+// noise.
 INSTANTIATE_TEST_SUITE_P(
     Cases,
     HardBrackets,
