@@ -20,13 +20,16 @@ struct MirrorBall {
     glm::dvec3 center_m{0.0};   ///< where the ball's centre was in the room
 };
 
-/// The camera that looked at the ball from `position_m`: towards its centre, Y up, focal length
-/// radius_px / tan(asin(radius_m / distance)), principal point at center_px. A camera inside the
-/// ball or straight above or below it is an InputError.
+/// The camera that looked at the ball from `position_m`: towards its centre, focal length
+/// radius_px / tan(asin(radius_m / distance)), principal point at center_px. `up` is the world
+/// direction that points upwards in the picture: Y for a camera held level, another one for a
+/// camera that was rolled. A camera inside the ball, or one that looks along `up`, is an
+/// InputError.
 [[nodiscard]] Camera ballCamera(const MirrorBall& ball,
                                 glm::dvec3 position_m,
                                 int width,
-                                int height);
+                                int height,
+                                glm::dvec3 up = {0.0, 1.0, 0.0});
 
 struct UnwrapOptions {
     int width =
@@ -67,5 +70,24 @@ struct LightProbe {
 /// middle proportional to the angle from −z, +x to the right, +y up. Width 0: the picture's
 /// resolution. Source: [Debevec98], the "light probe" format of his gallery.
 [[nodiscard]] LightProbe probeFromAngularMap(const Image<Rgb>& radiance, int width);
+
+/// A cube cross: the cube's inner side unfolded, seen from inside, faces square. The middle face of
+/// the arms looks along −z, as the centre of the other formats does.
+///   4 x 3 faces           3 x 4 faces [Debevec98]
+///        +y                    +y
+///   −x   −z   +x   +z     −x   −z   +x
+///        −y                    −y
+///                              +z, upside down
+/// Every two faces that touch go on into each other. Which of the two is told by the picture's
+/// shape; another one is an InputError. What is outside the faces is not looked at. Resampled by
+/// area; width 0: the picture's resolution.
+[[nodiscard]] LightProbe probeFromCubeCross(const Image<Rgb>& radiance, int width);
+
+enum class CubeLayout { Horizontal, Vertical };
+
+/// The same pictures from an environment, every pixel an average over its area, black outside the
+/// faces or the disc. `face` pixels a side, `side` of the whole square: in [2, 8192] (InputError).
+[[nodiscard]] Image<Rgb> cubeCross(const EnvironmentMap& environment, CubeLayout layout, int face);
+[[nodiscard]] Image<Rgb> angularMap(const EnvironmentMap& environment, int side);
 
 }  // namespace insitu
