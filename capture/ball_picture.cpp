@@ -101,12 +101,10 @@ BallPicture::BallPicture(const Image<Rgb>& radiance,
       options_(options),
       reflection_(ball.center_m, ball.radius_m, camera.position_m, kRimPixels / ball.radius_px),
       predicted_(projectOutline(reflection_, camera)),
-      scale_(ball.radius_px / predicted_.radius)
+      scale_(ball.radius_px / predicted_.radius),
+      rim_cosine_(std::cos(reflection_.lastDirection()))
 {
     reportOutline(predicted_, ball, findings);
-    // Far away, 1 - rim of the radius shows the direction at 2 asin(1 - rim) from the axis.
-    const double sine = 1.0 - kRimPixels / ball.radius_px;
-    rim_cosine_ = 1.0 - 2.0 * sine * sine;
 }
 
 BallPicture::Sample BallPicture::seen(glm::dvec3 direction) const

@@ -51,7 +51,7 @@ private:
     BallReflection reflection_;
     ProjectedOutline predicted_;
     double scale_;
-    double rim_cosine_;  ///< of the angle from the axis at which a far ball's usable part ends
+    double rim_cosine_;  ///< of the angle from the axis at which the usable part ends
 };
 
 /// Shares of the sphere that the ball does not show, by the directions of a coarse map: findings

@@ -72,6 +72,13 @@ BallReflection::Mismatch BallReflection::mismatch(double phi, double psi, double
     return {2.0 * phi - a - b, 2.0 - a_slope - b_slope};
 }
 
+double BallReflection::lastDirection() const
+{
+    const double to_camera_x = camera_distance_ - radius_ * std::cos(last_angle_);
+    const double to_camera_y = -radius_ * std::sin(last_angle_);
+    return 2.0 * last_angle_ - std::atan2(to_camera_y, to_camera_x);
+}
+
 glm::dvec3 BallReflection::pointAt(double angle, glm::dvec3 side) const
 {
     return center_ + radius_ * (std::cos(angle) * axis_ + std::sin(angle) * side);

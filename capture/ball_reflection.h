@@ -29,6 +29,8 @@ public:
 
     /// Angle between the axis and the tangent points of the outline, as seen from the centre.
     [[nodiscard]] double tangentAngle() const { return tangent_angle_; }
+    /// Angle from the axis of the direction, infinitely far, that the usable part's edge reflects.
+    [[nodiscard]] double lastDirection() const;
     /// Point of the ball at `angle` from the axis, towards `side` (a unit vector square to it).
     [[nodiscard]] glm::dvec3 pointAt(double angle, glm::dvec3 side) const;
     /// Unit vector from the centre to the camera.

@@ -274,7 +274,7 @@ std::optional<Outline> consensusCircle(const std::vector<RimRay>& rays,
 std::optional<OutlineFit> fitOutline(const std::vector<RimRay>& rays,
                                      const Outline& start,
                                      bool ellipse,
-                                     double tolerance)
+                                     Tolerance tolerance)
 {
     const int parameters = ellipse ? 5 : 3;
     Outline outline = start;
@@ -293,7 +293,8 @@ std::optional<OutlineFit> fitOutline(const std::vector<RimRay>& rays,
         support = 0.0;
         for (std::size_t i = 0; i < rays.size(); ++i) {
             const Nearest nearest = nearestTo(outline, rays[i]);
-            const double u = nearest.off / tolerance;
+            const double u =
+                nearest.off / (nearest.off < 0.0 ? tolerance.inside : tolerance.outside);
             if (!(std::abs(u) < 1.0)) continue;
             ++inliers;
             support += nearest.weight;

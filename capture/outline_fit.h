@@ -69,15 +69,20 @@ struct OutlineFit {
     Outline outline;
     double center_sigma = 0.0;  ///< pixels, worse axis
     double radius_sigma = 0.0;  ///< pixels
-    int inliers = 0;            ///< rays with a place within `tolerance`
+    int inliers = 0;            ///< rays with a place within the tolerance
     double support = 0.0;       ///< sum of their weights
 };
-/// Least squares through each ray's place nearest to the curve, Tukey's weights of width
-/// `tolerance`. Nothing when too few rays are left to determine the curve.
+/// Places farther from the curve than this, pixels, do not count.
+struct Tolerance {
+    double inside = 0.0;
+    double outside = 0.0;
+};
+/// Least squares through each ray's place nearest to the curve, Tukey's weights with each side's
+/// tolerance. Nothing when too few rays are left to determine the curve.
 [[nodiscard]] std::optional<OutlineFit> fitOutline(const std::vector<RimRay>& rays,
                                                    const Outline& start,
                                                    bool ellipse,
-                                                   double tolerance);
+                                                   Tolerance tolerance);
 
 /// Direction of ray i of n.
 [[nodiscard]] glm::dvec2 rayDirection(int ray, int rays);

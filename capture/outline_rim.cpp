@@ -18,8 +18,10 @@ namespace {
 /// Places tried and samples of a profile are so far apart. Pixels.
 constexpr double kPlaceStep = 0.25;
 constexpr double kSampleStep = 0.5;
-/// What a profile shows beyond the farthest place tried. Pixels.
-constexpr double kMargin = 3.0;
+/// What a profile shows beyond the farthest place tried: share of the radius, and limits in pixels.
+constexpr double kMarginShare = 0.04;
+constexpr double kLeastMargin = 1.5;
+constexpr double kMostMargin = 4.0;
 /// Rays are averaged along the outline over this angle.
 constexpr double kAverageRadians = 3.0 * std::numbers::pi / 180.0;
 /// Standard deviations of blur tried: pixel and bilinear look-up alone, up to out of focus.
@@ -55,9 +57,9 @@ Eigen::Matrix<double, 1, kShapes> shapesAt(double s, double blur)
 /// Orthonormal bases of the model's profiles, one for each place tried.
 class RimModel {
 public:
-    RimModel(double reach, double blur)
+    RimModel(double reach, double margin, double blur)
         : places_(2 * static_cast<int>(std::ceil(reach / kPlaceStep)) + 1),
-          samples_(2 * static_cast<int>(std::ceil((reach + kMargin) / kSampleStep)) + 1)
+          samples_(2 * static_cast<int>(std::ceil((reach + margin) / kSampleStep)) + 1)
     {
         for (int place = 0; place < places_; ++place) {
             Basis basis(samples_, kShapes);
@@ -130,9 +132,10 @@ std::vector<RimRay> locateRim(const OutlinePicture& picture,
     const auto count = static_cast<std::size_t>(rays);
     std::vector<Place> best;
     double best_misfit = std::numeric_limits<double>::infinity();
+    const double margin = std::clamp(kMarginShare * outline.radius, kLeastMargin, kMostMargin);
     std::vector<Eigen::MatrixXf> profiles;
     for (const double blur : kBlurs) {
-        const RimModel model(reach, blur);
+        const RimModel model(reach, margin, blur);
         if (profiles.empty())
             profiles =
                 rayProfiles(picture, outline, rays, model.samples(), kSampleStep, kAverageRadians);

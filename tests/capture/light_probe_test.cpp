@@ -4,6 +4,7 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "tests/capture/synthetic_ball.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -20,70 +21,6 @@ namespace {
 
 using std::numbers::pi;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// What a ray that leaves the ball at `origin` along `direction` sees.
-using Surroundings = std::function<Rgb(glm::dvec3 origin, glm::dvec3 direction)>;
-
-/// A picture of the ball traced ray by ray, `n` x `n` rays a pixel; the background is `behind`.
-Image<Rgb> renderBall(const MirrorBall& ball,
-                      const Camera& camera,
-                      const Surroundings& surroundings,
-                      glm::ivec2 crop = {0, 0},
-                      glm::ivec2 size = {0, 0},
-                      Rgb behind = Rgb(0.0f))
-{
-    constexpr int n = 3;
-    if (size.x == 0) size = {camera.width, camera.height};
-    Image<Rgb> image(size.x, size.y);
-    parallelFor(0, size.y, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
-        for (int x = 0; x < size.x; ++x) {
-            glm::dvec3 sum(0.0);
-            for (int k = 0; k < n * n; ++k) {
-                const glm::dvec2 pixel(crop.x + x + (k % n + 0.5) / n,
-                                       crop.y + y + (k / n + 0.5) / n);
-                const glm::dvec3 d = camera.rayDirection(pixel);
-                const glm::dvec3 from_center = camera.position_m - ball.center_m;
-                const double b = glm::dot(d, from_center);
-                const double q = glm::dot(from_center, from_center) - ball.radius_m * ball.radius_m;
-                if (b * b <= q) {
-                    sum += glm::dvec3(behind);
-                    continue;
-                }
-                const glm::dvec3 hit = camera.position_m + d * (-b - std::sqrt(b * b - q));
-                const glm::dvec3 normal = (hit - ball.center_m) / ball.radius_m;
-                const glm::dvec3 reflected = d - 2.0 * glm::dot(d, normal) * normal;
-                sum += ball.reflectance * glm::dvec3(surroundings(hit, reflected));
-            }
-            image(x, y) = Rgb(sum / static_cast<double>(n * n));
-        }
-    });
-    return image;
-}
-
-/// Distance from inside the box of a small room to its walls.
-constexpr glm::dvec3 kRoomLow(-1.6, 0.0, -2.1);
-constexpr glm::dvec3 kRoomHigh(1.9, 2.5, 1.7);
-double distanceToWalls(glm::dvec3 origin, glm::dvec3 direction)
-{
-    double nearest = kInfinity;
-    for (int axis = 0; axis < 3; ++axis) {
-        const double wall = direction[axis] > 0.0 ? kRoomHigh[axis] : kRoomLow[axis];
-        if (direction[axis] != 0.0)
-            nearest = std::min(nearest, (wall - origin[axis]) / direction[axis]);
-    }
-    return nearest;
-}
-
-/// A unit vector as a colour, and back: pictures that say where everything came from.
-Rgb colourOf(glm::dvec3 unit)
-{
-    return Rgb(0.5 * unit + 0.5);
-}
-glm::dvec3 vectorOf(Rgb colour)
-{
-    return glm::normalize(2.0 * glm::dvec3(colour) - 1.0);
-}
 
 MirrorBall ballAt(double radius_px)
 {
