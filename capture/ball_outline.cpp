@@ -40,8 +40,10 @@ constexpr double kCoarseTolerance = 1.5;
 /// An ellipse of axes 1.2 : 1 leaves its circle by 4.5 % of the radius.
 constexpr double kEllipseBand = 0.045;
 constexpr double kSizeBonus = 0.2;
-/// A circle around another one needs only this share of its score.
-constexpr double kOuterShare = 0.85;
+/// A circle around another one needs only this share of its score: one a little larger than what
+/// runs along its rim, one much larger than a lamp that it mirrors.
+constexpr double kRimShare = 0.85;
+constexpr double kLampShare = 0.6;
 constexpr double kOuterGrowth = 1.2;
 constexpr double kOuterSlack = 0.03;
 /// How far a given start may be off, share of the radius.
@@ -58,10 +60,10 @@ constexpr double kKeptShare = 0.5;
 /// still does.
 constexpr double kOuterEdgeShare = 0.72;
 /// Candidates looked at in full resolution.
-constexpr std::size_t kFinalists = 4;
+constexpr std::size_t kFinalists = 5;
 /// A circle with fewer edges is no ball; one with fewer than the second is doubtful.
 constexpr double kFoundShare = 0.2;
-constexpr double kFirmShare = 0.4;
+constexpr double kFirmShare = 0.33;
 /// Less of the outline than this in the picture is doubtful.
 constexpr double kFirmVisible = 0.6;
 /// Standard deviation, share of the radius, from which on the outline is doubtful.
@@ -134,13 +136,15 @@ bool isNear(const Outline& a, const Outline& b)
     return glm::length(a.center - b.center) < 1.5 && std::abs(a.radius - b.radius) < 1.5;
 }
 
-/// Whether `outer` is a little larger and holds `inner`. What a ball mirrors runs along its rim, so
-/// circles of edges are to be expected inside it, but not around it.
-bool encloses(const BallOutline& outer, const BallOutline& inner)
+/// The share of the score of `inner` that `outer` needs to be preferred: 1 unless it holds it. What
+/// a ball mirrors, lamps and whatever runs along its rim, makes circles inside it, but none around.
+double handicap(const BallOutline& outer, const BallOutline& inner)
 {
-    return outer.radius_px > inner.radius_px && outer.radius_px < kOuterGrowth * inner.radius_px &&
-           glm::length(outer.center_px - inner.center_px) <
-               outer.radius_px - inner.radius_px + kOuterSlack * inner.radius_px;
+    const double growth = outer.radius_px - inner.radius_px;
+    const double slack = kOuterSlack * inner.radius_px;
+    if (growth <= 0.0 || glm::length(outer.center_px - inner.center_px) > growth + slack)
+        return 1.0;
+    return outer.radius_px < kOuterGrowth * inner.radius_px ? kRimShare : kLampShare;
 }
 
 /// The circles that the reduced picture's edges vote for, in its pixels, judged by what long arcs
@@ -312,9 +316,7 @@ std::optional<BallOutline> searchPicture(const OutlinePicture& picture,
         if (!ball) continue;
         const double score =
             ball->inlier_share * ball->visible_share * std::pow(ball->radius_px, kSizeBonus);
-        double wanted = most;
-        if (best && encloses(*ball, *best)) wanted *= kOuterShare;
-        if (best && encloses(*best, *ball)) wanted /= kOuterShare;
+        const double wanted = best ? most * handicap(*ball, *best) / handicap(*best, *ball) : 0.0;
         if (score <= wanted) continue;
         most = score;
         best = ball;

@@ -19,8 +19,8 @@ struct BallOutline {
     double axis_angle = 0.0;    ///< of the longer axis from +x towards +y. Radians, [0, pi)
     double center_sigma = 0.0;  ///< standard deviation of the centre, the worse axis. Pixels
     double radius_sigma = 0.0;  ///< standard deviation of the radius. Pixels
-    /// Of the directions in which the outline lies inside the picture, the share that shows an edge
-    /// there. [0, 1]
+    /// Of the directions in which the outline lies inside the picture, the share that shows the rim
+    /// there, above what chance would give. [0, 1]; plain walls behind the ball make it small.
     double inlier_share = 0.0;
     double visible_share = 1.0;  ///< of the outline, inside the picture. [0, 1]
 };
@@ -59,11 +59,14 @@ struct BallOutlineResult {
 /// 3. At full resolution each ray's place is the one where a model of a mirror's rim fits best:
 ///    towards the rim the reflection turns into the background like the square root of the distance
 ///    (2 sqrt(2 (1 - r/R)) from straight on), so that a plain gradient would sit inside it.
-/// 4. Robust least squares, with the standard deviation from the scatter of sectors of 10 degrees.
+/// 4. Robust least squares that lets places inside count less, for what is mirrored along the rim
+///    lies there, and never outside; with the standard deviation from the scatter of sectors of 10
+///    degrees.
 ///
 /// Radiance is looked at through its logarithm, a bracket in the codes of all its frames, all
 /// channels. Centres outside the picture and balls below 12 pixels of radius are not looked for.
-/// Good for half axes that differ by up to 20 %. The answer does not depend on threads.
+/// Ellipses are found up to half axes of 1 : 0.92 (a ball 23 degrees off the axis), or near a start
+/// that gives their axes. The answer does not depend on threads.
 /// InputError: empty picture, NaN or infinity, unusable options.
 [[nodiscard]] BallOutlineResult findBallOutline(const Image<Rgb>& radiance,
                                                 const BallOutlineOptions& options = {});
