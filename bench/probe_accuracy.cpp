@@ -156,7 +156,12 @@ void printOutline(double radius_px, double off_axis_deg, double noise, bool clut
     addNoise(picture, noise);
     if (clutter) addClutter(picture, shot);
     BallOutlineOptions options;
-    options.ellipse = off_axis_deg > 0.0;
+    if (off_axis_deg > 0.0) {
+        options.ellipse = true;
+        options.start = predictBallOutline(
+            shot.ball.center_m + 0.05 * kRadius * shot.camera.up, kRadius, shot.camera);
+        options.start->center_px -= glm::dvec2(shot.crop);
+    }
     const auto start = std::chrono::steady_clock::now();
     const BallOutlineResult result = findBallOutline(picture, options);
     const double seconds =

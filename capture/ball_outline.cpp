@@ -1,5 +1,6 @@
 #include "capture/ball_outline.h"
 
+#include "capture/ball_reflection.h"
 #include "capture/outline_fit.h"
 #include "capture/outline_picture.h"
 #include "capture/outline_rim.h"
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 
 namespace insitu {
@@ -39,6 +41,7 @@ constexpr int kMostRays = 480;
 constexpr double kCoarseTolerance = 1.5;
 /// An ellipse of axes 1.2 : 1 leaves its circle by 4.5 % of the radius.
 constexpr double kEllipseBand = 0.045;
+constexpr double kEllipseTolerance = 0.02;
 constexpr double kSizeBonus = 0.2;
 /// A circle around another one needs only this share of its score: one a little larger than what
 /// runs along its rim, one much larger than a lamp that it mirrors.
@@ -101,6 +104,30 @@ double shareOfRim(int inliers, int rays, double visible)
     return std::max((share - chance) / (1.0 - chance), 0.0);
 }
 
+/// The consensus of an ellipse of the given shape: that of a circle where the ellipse is made one.
+std::optional<Outline> consensusOfShape(std::vector<RimRay> rays,
+                                        const Outline& near,
+                                        double reach,
+                                        double tolerance)
+{
+    const double e = glm::length(near.stretch);
+    const double half_angle = 0.5 * std::atan2(near.stretch.y, near.stretch.x);
+    const glm::dvec2 axis(std::cos(half_angle), std::sin(half_angle));
+    const glm::dvec2 other(-axis.y, axis.x);
+    const auto scaled = [&](glm::dvec2 arm, double along, double across) {
+        return glm::dot(arm, axis) * along * axis + glm::dot(arm, other) * across * other;
+    };
+    for (RimRay& ray : rays)
+        for (detail::RimPoint& point : ray)
+            point.place =
+                near.center + scaled(point.place - near.center, 1.0 / (1.0 + e), 1.0 / (1.0 - e));
+    std::optional<Outline> found = detail::consensusCircle(rays, near, reach, tolerance);
+    if (!found) return std::nullopt;
+    found->center = near.center + scaled(found->center - near.center, 1.0 + e, 1.0 - e);
+    found->stretch = near.stretch;
+    return found;
+}
+
 /// Edges in a window about the outline, joined by consensus, then fitted. The consensus is of a
 /// circle; an ellipse is looked for in a band about it as wide as ellipses need.
 std::optional<OutlineFit> searchNear(
@@ -116,8 +143,9 @@ std::optional<OutlineFit> searchNear(
         return detail::fitOutline(edges, *circle, false, {fine, fine});
     }
     const double band = std::max(fine, kEllipseBand * near.radius);
-    const std::optional<Outline> circle =
-        near.stretch == glm::dvec2(0.0) ? detail::consensusCircle(edges, near, window, band) : near;
+    const std::optional<Outline> circle = near.stretch == glm::dvec2(0.0)
+                                              ? detail::consensusCircle(edges, near, window, band)
+                                              : consensusOfShape(edges, near, window, 1.5 * sigma);
     if (!circle) return std::nullopt;
     const std::optional<OutlineFit> wide = detail::fitOutline(edges, *circle, true, {band, band});
     if (!wide) return std::nullopt;
@@ -265,7 +293,10 @@ std::optional<BallOutline> refineOutline(const OutlinePicture& picture,
         if (window <= 5.0 || window <= 0.02 * outline.radius) break;
     }
     const double tolerance = toleranceFor(outline.radius);
-    std::optional<OutlineFit> fit = fitRim(picture, outline, ellipse, tolerance, 1.0);
+    // Two more numbers to find need more room to find them in.
+    const double first =
+        ellipse ? std::max(tolerance, kEllipseTolerance * outline.radius) : tolerance;
+    std::optional<OutlineFit> fit = fitRim(picture, outline, ellipse, first, 1.0);
     if (fit) fit = fitRim(picture, fit->outline, ellipse, tolerance, 1.0);
     if (!fit) return std::nullopt;
     const BallOutline middle = ballFrom(picture, *fit);
@@ -375,6 +406,41 @@ Findings BallOutlineOptions::validate() const
             fmt::format("the start's axes are as {} to 1, must be in [0.8, 1]", start->axis_ratio));
     }
     return findings;
+}
+
+BallOutline predictBallOutline(glm::dvec3 center_m, double radius_m, const Camera& camera)
+{
+    const double distance = glm::length(camera.position_m - center_m);
+    if (!(radius_m > 0.0 && std::isfinite(distance) && distance > radius_m))
+        throw InputError("ball outline",
+                         fmt::format("the camera is {:.3g} m from the middle of a ball of radius "
+                                     "{:.3g} m",
+                                     distance,
+                                     radius_m));
+    const detail::BallReflection ball(center_m, radius_m, camera.position_m, 0.0);
+    std::vector<glm::dvec2> points;
+    glm::dvec2 low(std::numeric_limits<double>::max());
+    glm::dvec2 high(std::numeric_limits<double>::lowest());
+    constexpr int kPoints = 3600;
+    for (int i = 0; i < kPoints; ++i) {
+        const glm::dvec2 turn = detail::rayDirection(i, kPoints);
+        const std::optional<glm::dvec2> point = camera.project(
+            ball.pointAt(ball.tangentAngle(), turn.x * ball.sideA() + turn.y * ball.sideB()));
+        if (!point) throw InputError("ball outline", "the ball is not in front of the camera");
+        points.push_back(*point);
+        low = glm::min(low, *point);
+        high = glm::max(high, *point);
+    }
+    BallOutline outline;
+    outline.center_px = 0.5 * (low + high);
+    const auto arm = [&](glm::dvec2 point) { return glm::length(point - outline.center_px); };
+    const auto [shorter, longer] = std::ranges::minmax(points, {}, arm);
+    outline.radius_px = 0.5 * (arm(shorter) + arm(longer));
+    outline.axis_ratio = arm(shorter) / arm(longer);
+    const glm::dvec2 axis = longer - outline.center_px;
+    outline.axis_angle = std::atan2(axis.y, axis.x);
+    if (outline.axis_angle < 0.0) outline.axis_angle += pi;
+    return outline;
 }
 
 BallOutlineResult findBallOutline(const Image<Rgb>& radiance, const BallOutlineOptions& options)

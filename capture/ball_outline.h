@@ -1,6 +1,7 @@
 #pragma once
 
 #include "capture/bracket.h"
+#include "core/camera.h"
 #include "core/finding.h"
 #include "core/image.h"
 
@@ -27,10 +28,9 @@ struct BallOutline {
 
 /// How the outline is looked for.
 struct BallOutlineOptions {
-    /// A ball that looks at the camera off its axis is an ellipse. Off: a circle is fitted.
+    /// A ball away from the camera's axis is seen as an ellipse. Off: a circle is fitted.
     bool ellipse = false;
-    /// Where to begin: centre and radius, right within a tenth of the radius. Absent: the whole
-    /// picture is searched.
+    /// Where to begin, right within a tenth of the radius. Absent: the whole picture is searched.
     std::optional<BallOutline> start;
     /// Off: `start` is the answer, and only its share of edges is measured.
     bool refine = true;
@@ -65,12 +65,19 @@ struct BallOutlineResult {
 ///
 /// Radiance is looked at through its logarithm, a bracket in the codes of all its frames, all
 /// channels. Centres outside the picture and balls below 12 pixels of radius are not looked for.
-/// Ellipses are found up to half axes of 1 : 0.92 (a ball 23 degrees off the axis), or near a start
-/// that gives their axes. The answer does not depend on threads.
+/// The search of the whole picture is one for circles: an ellipse whose half axes differ by more
+/// than 2 % needs a start (predictBallOutline). The answer does not depend on threads.
 /// InputError: empty picture, NaN or infinity, unusable options.
 [[nodiscard]] BallOutlineResult findBallOutline(const Image<Rgb>& radiance,
                                                 const BallOutlineOptions& options = {});
 [[nodiscard]] BallOutlineResult findBallOutline(const Bracket& bracket,
                                                 const BallOutlineOptions& options = {});
+
+/// The outline, an ellipse, that a camera sees of a ball: where to start when it was photographed
+/// by a camera that is known, from a place of the ball that is known about. InputError: the camera
+/// is inside the ball or does not see all of it in front of it.
+[[nodiscard]] BallOutline predictBallOutline(glm::dvec3 center_m,
+                                             double radius_m,
+                                             const Camera& camera);
 
 }  // namespace insitu

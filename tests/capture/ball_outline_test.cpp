@@ -164,14 +164,31 @@ TEST(FindBallOutlineHard, EllipseOffTheAxis)
     ASSERT_GT(truth.shorter / truth.longer, 0.92);
     const Image<Rgb> picture =
         renderBall(ball, camera, roomRadiance, {0, 0}, {0, 0}, Rgb(0.0f), roomRadiance, 4);
+    const BallOutline exact = predictBallOutline(ball.center_m, ball.radius_m, camera);
+    EXPECT_LT(glm::length(exact.center_px - truth.center),
+              1e-3);  // both are polygons of the outline
+    EXPECT_NEAR(exact.axis_ratio, truth.shorter / truth.longer, 1e-4);
+    EXPECT_NEAR(std::cos(2.0 * (exact.axis_angle - truth.angle)), 1.0, 1e-3);
+
     BallOutlineOptions options;
     options.ellipse = true;
+    options.start =
+        predictBallOutline(ball.center_m + glm::dvec3(0.01, -0.01, 0.02), ball.radius_m, camera);
+    ASSERT_GT(glm::length(options.start->center_px - truth.center), 3.0);
     const BallOutlineResult result = findBallOutline(picture, options);
     ASSERT_TRUE(result.outline);
     EXPECT_LT(glm::length(result.outline->center_px - truth.center), 1.0);
     EXPECT_NEAR(result.outline->radius_px, 0.5 * (truth.longer + truth.shorter), 1.0);
     EXPECT_NEAR(result.outline->axis_ratio, truth.shorter / truth.longer, 0.01);
     EXPECT_NEAR(std::cos(2.0 * (result.outline->axis_angle - truth.angle)), 1.0, 0.05);
+}
+
+TEST(PredictBallOutline, RefusesABallThatIsNotInFront)
+{
+    const Camera camera = Camera::lookAt({0.0, 1.0, 1.0}, {0.0, 1.0, 0.0}, 500.0, 800, 600);
+    EXPECT_THROW((void)predictBallOutline({0.0, 1.0, 2.0}, 0.1, camera), InputError);
+    EXPECT_THROW((void)predictBallOutline({0.0, 1.0, 0.95}, 0.1, camera), InputError);
+    EXPECT_THROW((void)predictBallOutline({0.0, 1.0, 0.0}, -0.1, camera), InputError);
 }
 
 // Codes of a camera that clips: the rim must come from the frames that show it.
