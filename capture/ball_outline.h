@@ -61,7 +61,7 @@ struct BallOutlineResult {
 ///    (2 sqrt(2 (1 - r/R)) from straight on), so that a plain gradient would sit inside it.
 /// 4. Robust least squares that lets places inside count less, for what is mirrored along the rim
 ///    lies there, and never outside; with the standard deviation from the scatter of sectors of 10
-///    degrees.
+///    degrees and half the difference to a fit that counts both sides alike.
 ///
 /// Radiance is looked at through its logarithm, a bracket in the codes of all its frames, all
 /// channels. Centres outside the picture and balls below 12 pixels of radius are not looked for.

@@ -15,9 +15,10 @@ namespace insitu::detail {
 
 namespace {
 
-/// Places tried and samples of a profile are so far apart. Pixels.
-constexpr double kPlaceStep = 0.25;
-constexpr double kSampleStep = 0.5;
+/// Samples of a profile are at least so far apart, places tried half of that. Pixels.
+constexpr double kFinestStep = 0.5;
+/// ... or this share of the reach: a far reach is there to find a place, not to measure it.
+constexpr double kStepShare = 1.0 / 12.0;
 /// What a profile shows beyond the farthest place tried: share of the radius, and limits in pixels.
 constexpr double kMarginShare = 0.04;
 constexpr double kLeastMargin = 1.5;
@@ -58,8 +59,9 @@ Eigen::Matrix<double, 1, kShapes> shapesAt(double s, double blur)
 class RimModel {
 public:
     RimModel(double reach, double margin, double blur)
-        : places_(2 * static_cast<int>(std::ceil(reach / kPlaceStep)) + 1),
-          samples_(2 * static_cast<int>(std::ceil((reach + margin) / kSampleStep)) + 1)
+        : step_(std::max(kFinestStep, kStepShare * reach)),
+          places_(2 * static_cast<int>(std::ceil(2.0 * reach / step_)) + 1),
+          samples_(2 * static_cast<int>(std::ceil((reach + margin) / step_)) + 1)
     {
         for (int place = 0; place < places_; ++place) {
             Basis basis(samples_, kShapes);
@@ -70,16 +72,13 @@ public:
         }
     }
 
-    [[nodiscard]] int places() const { return places_; }
+    [[nodiscard]] double step() const { return step_; }
     [[nodiscard]] int samples() const { return samples_; }
     [[nodiscard]] double offsetOf(double place) const
     {
-        return (place - 0.5 * (places_ - 1)) * kPlaceStep;
+        return (place - 0.5 * (places_ - 1)) * 0.5 * step_;
     }
-    [[nodiscard]] double sampleOffset(int i) const
-    {
-        return (i - 0.5 * (samples_ - 1)) * kSampleStep;
-    }
+    [[nodiscard]] double sampleOffset(int i) const { return (i - 0.5 * (samples_ - 1)) * step_; }
     /// Sum of squares that the model leaves of profiles (columns), for each place.
     [[nodiscard]] Eigen::VectorXd residuals(const Eigen::MatrixXd& profiles) const
     {
@@ -94,6 +93,7 @@ public:
     }
 
 private:
+    double step_;
     int places_;
     int samples_;
     std::vector<Basis> bases_;
@@ -118,7 +118,7 @@ Place bestPlace(const RimModel& model, Eigen::MatrixXd profiles)
     if (!(bend > 0.0)) return best;
     const double shift = std::clamp(0.5 * (left(at - 1) - left(at + 1)) / bend, -0.5, 0.5);
     best.offset = model.offsetOf(static_cast<double>(at) + shift);
-    best.sigma = kPlaceStep * std::sqrt(2.0 * std::max(best.misfit, 1.0) / bend);
+    best.sigma = 0.5 * model.step() * std::sqrt(2.0 * std::max(best.misfit, 1.0) / bend);
     return best;
 }
 
@@ -138,7 +138,7 @@ std::vector<RimRay> locateRim(const OutlinePicture& picture,
         const RimModel model(reach, margin, blur);
         if (profiles.empty())
             profiles =
-                rayProfiles(picture, outline, rays, model.samples(), kSampleStep, kAverageRadians);
+                rayProfiles(picture, outline, rays, model.samples(), model.step(), kAverageRadians);
         std::vector<Place> places(count);
         parallelFor(0, rays, [&](std::int64_t index) {
             const auto i = static_cast<std::size_t>(index);

@@ -31,6 +31,8 @@ constexpr double kOuterGrowth = 1.2;
 constexpr double kOuterSlack = 0.03;
 /// Candidates looked at in full resolution.
 constexpr std::size_t kFinalists = 5;
+/// ... when they have this share of the best one's score.
+constexpr double kFinalistShare = 0.7;
 
 /// A circle of the reduced picture, and how well its edges speak for it.
 struct Candidate {
@@ -96,7 +98,12 @@ std::optional<BallOutline> searchPicture(const OutlinePicture& picture,
         searchEverywhere(picture.reduced(factor),
                          std::max(smallest / factor, kSmallestCoarseRadius),
                          options.ellipse);
+    if (candidates.empty()) return std::nullopt;
     if (candidates.size() > kFinalists) candidates.resize(kFinalists);
+    std::erase_if(candidates,
+                  [least = kFinalistShare * candidates.front().score](const Candidate& c) {
+                      return c.score < least;
+                  });
     std::optional<BallOutline> best;
     double most = 0.0;
     for (const Candidate& candidate : candidates) {
