@@ -171,6 +171,7 @@ void printOutline(
     fmt::print("{:6.0f} {:8.0f} {:6.1f} {:6.2f} {:>8} | ",
                radius_px,
                off_axis_deg,
+               reflectance,
                noise,
                clutter ? "yes" : "no");
     if (!result.outline) {
