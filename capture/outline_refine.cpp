@@ -209,7 +209,9 @@ std::optional<BallOutline> refineOutline(const OutlinePicture& picture,
     const BallOutline middle = ballFrom(picture, *fit);
     const BallOutline outer = ballFrom(picture, fitOuterEdge(picture, *fit, ellipse, tolerance));
     BallOutline ball = outer.inlier_share >= kOuterEdgeShare * middle.inlier_share ? outer : middle;
-    // What the scatter does not show: how much the answer depends on the model of the rim.
+    // What the scatter does not show: where both speak for themselves, how much the answer depends
+    // on the choice.
+    if (middle.inlier_share < kOuterEdgeShare * outer.inlier_share) return ball;
     ball.center_sigma =
         std::hypot(ball.center_sigma, 0.5 * glm::length(outer.center_px - middle.center_px));
     ball.radius_sigma = std::hypot(ball.radius_sigma, 0.5 * (outer.radius_px - middle.radius_px));
