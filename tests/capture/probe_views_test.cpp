@@ -170,11 +170,14 @@ TEST(MergeProbeViews, ReportsAndMatchesExposure)
 TEST(MergeProbeViews, SaysWhenTheViewsShowDifferentThings)
 {
     const ProbeView front = viewFrom(kFront, roomRadiance);
-    ProbeView side = viewFrom(kSideways, [](glm::dvec3 origin, glm::dvec3 d) {
-        return roomRadiance(origin, glm::dvec3(-d.x, -d.y, d.z));
+    // A third each is darker, equal and brighter by more than half: the median ratio stays 1.
+    const ProbeView side = viewFrom(kSideways, [](glm::dvec3 origin, glm::dvec3 d) {
+        const int band = static_cast<int>(std::floor(15.0 * (std::atan2(d.x, d.z) / pi + 1.0))) % 3;
+        return roomRadiance(origin, d) * static_cast<float>(std::pow(1.6, band - 1));
     });
     const MergedProbe merged = mergeProbeViews({front, side}, inTheRoom());
     EXPECT_TRUE(hasFinding(merged.probe.findings, "probe-views-disagree"));
+    EXPECT_NEAR(merged.exposure_ratios[1].g, 1.0, 0.08);  // below what is reported by itself
 }
 
 TEST(MergeProbeViews, DoesNotDependOnTheNumberOfThreads)
