@@ -21,6 +21,8 @@ CapturedRadiance captureRadiance(Bracket bracket,
     } else {
         ResponseRecovery recovery = recoverResponse(bracket, options.response);
         result.response_known = !hasFinding(recovery.findings, "response-not-recoverable");
+        for (std::size_t i = 0; i < recovery.exposure_scale.size(); ++i)
+            bracket.frames[i].relative_exposure *= recovery.exposure_scale[i];
         result.response = std::move(recovery.curve);
         append(result.findings, std::move(recovery.findings));
     }

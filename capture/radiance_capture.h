@@ -30,7 +30,8 @@ struct CapturedRadiance {
     Findings findings;  ///< of all steps, in order; those of `bracket` are not repeated
 };
 
-/// alignBracket → recoverResponse (unless `response` is given) → findMovedPixels → mergeBracket.
+/// alignBracket → recoverResponse (unless `response` is given; corrects the frames' exposures) →
+/// findMovedPixels → mergeBracket.
 /// A single exposure is linearised and no more. Errors and findings as each of them.
 [[nodiscard]] CapturedRadiance captureRadiance(Bracket bracket,
                                                const std::optional<ResponseCurve>& response,

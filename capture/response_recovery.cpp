@@ -128,8 +128,7 @@ ResponseRecovery recoverFromGroups(const Bracket& bracket,
 
 void checkOptions(const ResponseOptions& options)
 {
-    const Findings problems = options.validate();
-    if (!problems.empty()) throw InputError("response options", problems.front().message);
+    requireValid(options.validate(), "response options");
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ void parts(auto& archive, PartsOf<Model> auto& v)
 
 void parts(auto& archive, PartsOf<ResponseOptions> auto& v)
 {
-    archive(v.samples, v.smoothness);
+    archive(v.method, v.samples, v.smoothness, v.refine_exposures);
 }
 void parts(auto& archive, PartsOf<ChannelNoise> auto& v)
 {
@@ -141,10 +141,10 @@ void parts(auto& archive, PartsOf<InsertionOptions> auto& v)
     archive(v.technique, v.max_samples, v.min_samples, v.target_error, v.max_seconds, v.seed);
     archive(v.path, v.interreflection, v.filter);
 }
-static_assert(sizeof(ResponseOptions) == 16 && sizeof(MergeOptions) == 120);
+static_assert(sizeof(ResponseOptions) == 24 && sizeof(MergeOptions) == 120);
 static_assert(sizeof(ChannelNoise) == 32 && sizeof(NoiseModel) == 96);
 static_assert(sizeof(AlignmentOptions) == 32 && sizeof(DeghostOptions) == 24);
-static_assert(sizeof(CaptureOptions) == 200);
+static_assert(sizeof(CaptureOptions) == 208);
 static_assert(sizeof(RoomLightOptions) == 56 && sizeof(PathOptions) == 8);
 static_assert(sizeof(InterreflectionOptions) == 24 && sizeof(IrradianceFilterOptions) == 16);
 static_assert(sizeof(InsertionOptions) == 88);

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string_view>
 
@@ -70,6 +71,20 @@ void addBracketOptions(CLI::App& command, BracketArguments& arguments)
                      arguments.capture.deghost,
                      "Leave out what moved between the exposures (experimental: masks too much "
                      "where the response is uncertain)");
+    command
+        .add_option("--method",
+                    arguments.capture.response.method,
+                    "How the response is recovered: auto, debevec, mitsunaga, robertson or basis")
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, ResponseMethod>{{"auto", ResponseMethod::Auto},
+                                                  {"debevec", ResponseMethod::Debevec},
+                                                  {"mitsunaga", ResponseMethod::Mitsunaga},
+                                                  {"robertson", ResponseMethod::Robertson},
+                                                  {"basis", ResponseMethod::Basis}},
+            CLI::ignore_case));
+    command.add_flag("!--no-refine-exposures",
+                     arguments.capture.response.refine_exposures,
+                     "Take the exposures as given, even where the pictures show other ratios");
     command
         .add_option("--samples",
                     arguments.capture.response.samples,

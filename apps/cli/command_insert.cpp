@@ -88,10 +88,9 @@ void registerInsert(CLI::App& app, Context& context)
         ->capture_default_str();
     command->add_flag(
         "--ignore-exif-focal", arguments->ignore_exif_focal, "Calibrate from the lines alone");
-    command->add_flag(
-        "--no-align",
-        arguments->no_align,
-        "Take the probe's frames as they lie (hand-held ones are aligned by default)");
+    command->add_flag("--align",
+                      arguments->options.capture.align,
+                      "Lay the probe's frames onto each other: for brackets held in the hand");
     command->add_option("--cache",
                         arguments->options.cache_folder,
                         "Folder in which the results of stages are kept for the next run "
