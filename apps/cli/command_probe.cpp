@@ -1,5 +1,6 @@
 #include "apps/cli/bracket_input.h"
 #include "apps/cli/command.h"
+#include "capture/ball_outline.h"
 #include "capture/light_probe.h"
 #include "core/io/image_io.h"
 
@@ -38,27 +39,49 @@ Image<Rgb> readProbeRadiance(const ProbeArguments& arguments, Context& context)
     return mergeArguments(arguments.bracket, context).merged.radiance.pixels;
 }
 
-/// What was not given is taken from the usual crop: the ball fills the picture, seen from +z.
+/// The outline given, or else found in the picture, or else that of a ball that fills it.
+void placeOutline(const Image<Rgb>& radiance,
+                  const ProbeArguments& arguments,
+                  MirrorBall& ball,
+                  Findings& findings)
+{
+    ball.center_px = 0.5 * glm::dvec2(radiance.width(), radiance.height());
+    ball.radius_px = 0.5 * std::min(radiance.width(), radiance.height());
+    if (!arguments.center_px || !arguments.radius_px) {
+        // A doubtful circle is no better than the usual crop, which the ball fills.
+        BallOutlineResult found = findBallOutline(radiance);
+        if (hasFinding(found.findings, "ball-outline-weak")) found.outline.reset();
+        if (found.outline) {
+            ball.center_px = found.outline->center_px;
+            ball.radius_px = found.outline->radius_px;
+        }
+        findings.push_back(
+            {found.outline ? Severity::Info : Severity::Warning,
+             found.outline ? "probe-outline-found" : "probe-outline-assumed",
+             fmt::format(
+                 "the ball's outline {} centre ({:.1f}, {:.1f}), radius {:.1f} px; --center "
+                 "and --radius give another",
+                 found.outline ? "was found:"
+                               : "was not found and is taken to fill the "
+                                 "picture:",
+                 ball.center_px.x,
+                 ball.center_px.y,
+                 ball.radius_px)});
+    }
+    if (arguments.center_px)
+        ball.center_px = {(*arguments.center_px)[0], (*arguments.center_px)[1]};
+    if (arguments.radius_px) ball.radius_px = *arguments.radius_px;
+}
+
+/// What was not given is found in the picture, or taken from the usual shot: seen from +z.
 LightProbe unwrapBall(const Image<Rgb>& radiance, const ProbeArguments& arguments)
 {
     MirrorBall ball;
-    ball.center_px = 0.5 * glm::dvec2(radiance.width(), radiance.height());
-    if (arguments.center_px)
-        ball.center_px = {(*arguments.center_px)[0], (*arguments.center_px)[1]};
-    ball.radius_px =
-        arguments.radius_px.value_or(0.5 * std::min(radiance.width(), radiance.height()));
+    Findings assumed;
+    placeOutline(radiance, arguments, ball, assumed);
     ball.radius_m = arguments.radius_m;
     ball.reflectance = arguments.reflectance;
     ball.center_m = toVec3(arguments.position_m);
-    Findings assumed;
-    if (!arguments.center_px || !arguments.radius_px)
-        assumed.push_back({Severity::Info,
-                           "probe-outline-assumed",
-                           fmt::format("the ball's outline is taken as centre ({}, {}), radius {} "
-                                       "px; give --center and --radius",
-                                       ball.center_px.x,
-                                       ball.center_px.y,
-                                       ball.radius_px)});
     glm::dvec3 view = ball.center_m + glm::dvec3(0.0, 0.0, 20.0 * ball.radius_m);
     if (arguments.view_position_m)
         view = toVec3(*arguments.view_position_m);
@@ -89,6 +112,8 @@ void runProbe(const ProbeArguments& arguments, Context& context)
         probe = probeFromLatLong(radiance, arguments.width);
     else if (arguments.kind == "angular")
         probe = probeFromAngularMap(radiance, arguments.width);
+    else if (arguments.kind == "cube-cross")
+        probe = probeFromCubeCross(radiance, arguments.width);
     else
         probe = unwrapBall(radiance, arguments);
     context.print(probe.findings);
@@ -100,12 +125,12 @@ void addBallOptions(CLI::App& command, ProbeArguments& arguments)
     command
         .add_option("--center",
                     arguments.center_px,
-                    "Centre of the ball's outline, x,y in pixels (default: the picture's)")
+                    "Centre of the ball's outline, x,y in pixels (default: found)")
         ->delimiter(',');
     command
         .add_option("--radius",
                     arguments.radius_px,
-                    "Radius of the ball's outline in pixels (default: it fills the picture)")
+                    "Radius of the ball's outline in pixels (default: found)")
         ->check(CLI::PositiveNumber);
     command.add_option("--radius-m", arguments.radius_m, "Radius of the ball in metres")
         ->check(CLI::PositiveNumber)
@@ -135,8 +160,8 @@ void registerProbe(CLI::App& app, Context& context)
     addBracketOptions(*command, arguments->bracket);
     command->add_option("-o,--output", arguments->output, "Environment to write (.exr, .hdr, .pfm)")
         ->required();
-    command->add_option("--kind", arguments->kind, "mirror-ball, angular or latlong")
-        ->check(CLI::IsMember({"mirror-ball", "angular", "latlong"}))
+    command->add_option("--kind", arguments->kind, "mirror-ball, angular, latlong or cube-cross")
+        ->check(CLI::IsMember({"mirror-ball", "angular", "latlong", "cube-cross"}))
         ->capture_default_str();
     addBallOptions(*command, *arguments);
     command->add_option("--width", arguments->width, "Width of the environment (0: automatic)")

@@ -159,6 +159,35 @@ TEST_F(MergeAndProbe, ProbeMakesAnEnvironmentOfEachKind)
         1);
 }
 
+TEST_F(MergeAndProbe, ProbeReadsCubeCrosses)
+{
+    writeRadiance(file("cross.exr"), Image<Rgb>(64, 48, Rgb(2.0f)));
+    const ProgramRun run =
+        runProgram({"probe", file("cross.exr"), "-o", file("c.exr"), "--kind", "cube-cross"});
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    EXPECT_NEAR(readRadiance(file("c.exr")).pixels(5, 5).g, 2.0f, 1e-5f);
+    writeRadiance(file("square.exr"), Image<Rgb>(64, 64, Rgb(2.0f)));
+    EXPECT_EQ(runProgram({"probe", file("square.exr"), "-o", file("s.exr"), "--kind", "cube-cross"})
+                  .exit_code,
+              1);
+}
+
+TEST_F(MergeAndProbe, ProbeFindsTheBall)
+{
+    const std::filesystem::path sample =
+        std::filesystem::path(INSITU_SOURCE_DIR) / "samples" / "simulated-room";
+    const ProgramRun run = runProgram({"probe",
+                                       (sample / "ball_1_8.jpg").string(),
+                                       (sample / "ball_1_32.jpg").string(),
+                                       (sample / "ball_1_128.jpg").string(),
+                                       "-o",
+                                       file("env.exr"),
+                                       "--width",
+                                       "64"});
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    EXPECT_THAT(run.messages, HasSubstr("probe-outline-found"));
+}
+
 TEST_F(MergeAndProbe, ProbeMergesABracketAndSaysWhatItAssumed)
 {
     const ProgramRun run = runProgram(command("probe", ".jpg", {"-o", file("env.exr")}));
