@@ -125,8 +125,11 @@ Bracket readBracket(const std::vector<std::filesystem::path>& files,
     std::vector<Exposure> exposures;
     std::vector<std::string> cameras;
     PhotoMetadata first;
+    Findings told;
     for (std::size_t i = 0; i < files.size(); ++i) {
         Photo photo = readPhoto(files[i]);
+        // One picture of a camera speaks for all of them.
+        if (told.empty()) told = photoFindings(photo.metadata, files[i].filename().string());
         const Exposure exposure = overrides.empty()
                                       ? photo.metadata.exposure
                                       : overridden(photo.metadata.exposure, overrides[i]);
@@ -141,6 +144,7 @@ Bracket readBracket(const std::vector<std::filesystem::path>& files,
     }
     Bracket bracket = makeBracket(std::move(frames), std::move(first));
     checkMetadata(exposures, cameras, bracket.findings);
+    append(bracket.findings, std::move(told));
     return bracket;
 }
 

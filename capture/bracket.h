@@ -31,7 +31,7 @@ struct Bracket {
 /// member; it is empty or has one entry a file. InputError: unequal sizes, no exposure known
 /// (naming the file and the remedy), no file.
 /// Findings: "bracket-single-exposure", "bracket-duplicate-exposure", "bracket-mixed-cameras",
-/// "bracket-partial-exposure" (f-number or ISO known for some frames only).
+/// "bracket-partial-exposure" (f-number or ISO known for some frames only), photoFindings().
 [[nodiscard]] Bracket readBracket(const std::vector<std::filesystem::path>& files,
                                   const std::vector<Exposure>& overrides = {});
 

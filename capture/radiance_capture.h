@@ -6,6 +6,8 @@
 #include "capture/response_recovery.h"
 
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace insitu {
 
@@ -23,9 +25,22 @@ struct CaptureOptions {
     MergeOptions merge;
 };
 
+/// One exposure of the bracket, as it was used.
+struct CapturedFrame {
+    std::string name;
+    double nominal_exposure = 0.0;  ///< relative, as EXIF or the user gave it
+    double used_exposure = 0.0;     ///< corrected by what the pictures show
+    double clipped_fraction = 0.0;  ///< of the pixels: some channel above the clipping limit
+    double black_fraction = 0.0;    ///< of the pixels: all channels below the limit of black
+};
+
 struct CapturedRadiance {
     ResponseCurve response;
     bool response_known = false;  ///< given or recovered, not assumed
+    /// Mean error of codes of inner exposures predicted from the others, of 255; negative when the
+    /// response was given or there is no inner exposure.
+    double held_out_error_codes = -1.0;
+    std::vector<CapturedFrame> frames;  ///< from the longest exposure to the shortest
     MergeResult merged;
     Findings findings;  ///< of all steps, in order; those of `bracket` are not repeated
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/exposure.h"
+#include "core/finding.h"
 #include "core/image.h"
 
 #include <cstdint>
@@ -37,6 +38,10 @@ struct Photo {
     EncodedImage image;
     PhotoMetadata metadata;
 };
+
+/// What has to be told of a photograph as read: "photo-profile-ignored" (Info) when a colour
+/// profile is embedded, which is not applied. `name` is for the message.
+[[nodiscard]] Findings photoFindings(const PhotoMetadata& metadata, const std::string& name);
 
 /// Scene-linear image, Rec. 709 primaries, finite and >= 0.
 ///

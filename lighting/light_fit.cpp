@@ -123,7 +123,8 @@ ChannelFit fitFrom(std::vector<Face> faces, Bands log_s)
         log_s = glm::clamp(log_s + glm::clamp(step, -kMaxStep, kMaxStep), kLowestLog, kHighestLog);
     }
     const NormalEquations normal = equations(faces, log_s);
-    const glm::dmat4 covariance = glm::inverse(normal.matrix) * (kPattern * kPattern * kPatternArea);
+    const glm::dmat4 covariance =
+        glm::inverse(normal.matrix) * (kPattern * kPattern * kPatternArea);
     fit.log_s = log_s;
     for (int b = 0; b < 4; ++b)
         fit.log_sigma[b] = std::sqrt(std::max(0.0, covariance[b][b]));

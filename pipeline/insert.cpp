@@ -269,6 +269,8 @@ InsertResult insertObjects(const Project& project, const InsertOptions& options,
     InsertResult result;
     Stopwatch watch(result.times);
     result.photo = readPhoto(project.photo.path);
+    append(result.findings,
+           photoFindings(result.photo.metadata, project.photo.path.filename().string()));
     result.camera = solveCamera(project, result.photo, options.use_exif_focal);
     append(result.findings, result.camera.findings);
     const Camera& camera = result.camera.camera;

@@ -2,6 +2,7 @@
 
 #include "core/io/image_io.h"
 #include "core/io/json.h"
+#include "pipeline/findings_json.h"
 
 #include <numbers>
 
@@ -14,16 +15,6 @@ Json vectorJson(glm::dvec3 v)
     return Json::array({v.x, v.y, v.z});
 }
 
-Json findingsJson(const Findings& findings)
-{
-    Json list = Json::array();
-    for (const Finding& finding : findings)
-        list.push_back({{"severity", severityName(finding.severity)},
-                        {"code", finding.code},
-                        {"message", finding.message}});
-    return list;
-}
-
 Json cameraJson(const CameraEstimate& estimate)
 {
     const Camera& camera = estimate.camera;
@@ -33,17 +24,6 @@ Json cameraJson(const CameraEstimate& estimate)
             {"position_m_sigma", vectorJson(estimate.position_sigma_m)},
             {"rotation_deg_sigma", estimate.rotation_sigma_rad * 180.0 / std::numbers::pi},
             {"residual_rms_px", estimate.residual_rms_px}};
-}
-
-void addColor(const std::string& name, const Image<Rgb>& image, std::vector<ExrChannel>& channels)
-{
-    static constexpr const char* kNames[] = {"R", "G", "B"};
-    for (int c = 0; c < 3; ++c) {
-        Image<float> plane(image.width(), image.height());
-        for (std::size_t i = 0; i < image.pixelCount(); ++i)
-            plane.pixels()[i] = image.pixels()[i][c];
-        channels.push_back({name + "." + kNames[c], std::move(plane)});
-    }
 }
 
 }  // namespace
@@ -97,10 +77,10 @@ void writeLayers(const std::filesystem::path& path, const InsertResult& result)
 {
     const RenderLayers& layers = result.render.layers;
     std::vector<ExrChannel> channels;
-    addColor("beauty", result.composite.linear, channels);
-    addColor("object", layers.object, channels);
-    addColor("irradiance.with", layers.irradiance_with, channels);
-    addColor("irradiance.without", layers.irradiance_without, channels);
+    addColorLayer(channels, "beauty", result.composite.linear);
+    addColorLayer(channels, "object", layers.object);
+    addColorLayer(channels, "irradiance.with", layers.irradiance_with);
+    addColorLayer(channels, "irradiance.without", layers.irradiance_without);
     channels.push_back({"object.A", layers.alpha});
     channels.push_back({"depth.Z", layers.depth_m});
     channels.push_back({"variance.object.Y", layers.object_variance});

@@ -2,6 +2,7 @@
 #include "apps/cli/command.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
+#include "pipeline/capture_report.h"
 
 #include <algorithm>
 #include <cctype>
@@ -16,6 +17,8 @@ struct MergeArguments {
     BracketArguments bracket;
     std::filesystem::path output;
     std::filesystem::path save_response;
+    std::filesystem::path report;
+    std::filesystem::path plot;
 };
 
 bool isExr(const std::filesystem::path& path)
@@ -47,14 +50,17 @@ void writeMerged(const std::filesystem::path& path, const MergeResult& merged)
 void runMerge(const MergeArguments& arguments, Context& context)
 {
     context.start();
-    context.checkOutput(arguments.output);
-    if (!arguments.save_response.empty()) context.checkOutput(arguments.save_response);
+    for (const auto& path :
+         {arguments.output, arguments.save_response, arguments.report, arguments.plot})
+        if (!path.empty()) context.checkOutput(path);
     if (!isRadianceFile(arguments.output))
         throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
     const CapturedRadiance result = mergeArguments(arguments.bracket, context);
     writeMerged(arguments.output, result.merged);
     if (!arguments.save_response.empty())
         writeJson(arguments.save_response, toJson(result.response));
+    if (!arguments.report.empty()) writeCaptureReport(arguments.report, result);
+    if (!arguments.plot.empty()) writeResponsePlot(arguments.plot, result.response);
 }
 
 }  // namespace
@@ -70,6 +76,10 @@ void registerMerge(CLI::App& app, Context& context)
         ->required();
     command->add_option(
         "--save-response", arguments->save_response, "Write the response curve (.json)");
+    command->add_option("--report",
+                        arguments->report,
+                        "Also write exposures, response, noise and findings (.json)");
+    command->add_option("--plot", arguments->plot, "Also draw the response curve (.svg)");
     context.addCommonOptions(*command);
     command->footer(
         "An .exr also holds the layers variance.R, .G, .B (of the radiance, per pixel) and "

@@ -88,6 +88,16 @@ PhotoMetadata readMetadata(const EncodedHeader& header, std::span<const std::uin
 
 }  // namespace
 
+Findings photoFindings(const PhotoMetadata& metadata, const std::string& name)
+{
+    if (!metadata.has_icc_profile) return {};
+    return {{Severity::Info,
+             "photo-profile-ignored",
+             fmt::format("{}: the embedded colour profile is not applied: colours count as sRGB's. "
+                         "If it is a wide one (Display P3), convert the pictures to sRGB first",
+                         name)}};
+}
+
 Photo readPhoto(const std::filesystem::path& path, std::int64_t max_pixels)
 {
     const std::string name = path.string();

@@ -159,6 +159,32 @@ TEST_F(MergeAndProbe, ProbeMakesAnEnvironmentOfEachKind)
         1);
 }
 
+TEST_F(MergeAndProbe, MergeReportsExposuresAndDrawsTheResponse)
+{
+    const ProgramRun run = runProgram(
+        command("merge",
+                ".jpg",
+                {"-o", file("r.exr"), "--report", file("r.json"), "--plot", file("r.svg")}));
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    std::ifstream report_file(file("r.json"));
+    const auto report = nlohmann::json::parse(report_file);
+    EXPECT_EQ(report["format"], "insitu-capture-report");
+    ASSERT_GT(report["exposures"].size(), 1u);
+    double longer = 1e30;
+    for (const auto& frame : report["exposures"]) {
+        const double used = frame["used_exposure"];
+        EXPECT_LT(used, longer);
+        EXPECT_NEAR(used / frame["nominal_exposure"].get<double>(), 1.0, 0.2);
+        longer = used;
+    }
+    EXPECT_EQ(report["response"]["exposure"].size(), 3u);
+    EXPECT_EQ(report["noise"].size(), 3u);
+    std::ifstream plot(file("r.svg"));
+    const std::string svg((std::istreambuf_iterator<char>(plot)), {});
+    EXPECT_THAT(svg, HasSubstr("<svg"));
+    EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
+}
+
 TEST_F(MergeAndProbe, ProbeReadsCubeCrosses)
 {
     writeRadiance(file("cross.exr"), Image<Rgb>(64, 48, Rgb(2.0f)));

@@ -290,7 +290,10 @@ TEST(Photo, ProfilesAreReported)
     Bytes jpeg = orientedJpeg(1);
     const std::string_view profile("\xFF\xE2\x00\x10ICC_PROFILE\0\1\1", 18);
     jpeg.insert(jpeg.begin() + 2, profile.begin(), profile.end());
-    EXPECT_TRUE(readPhoto(folder.add("a.jpg", jpeg)).metadata.has_icc_profile);
+    const PhotoMetadata metadata = readPhoto(folder.add("a.jpg", jpeg)).metadata;
+    EXPECT_TRUE(metadata.has_icc_profile);
+    EXPECT_TRUE(hasFinding(photoFindings(metadata, "a.jpg"), "photo-profile-ignored"));
+    EXPECT_TRUE(photoFindings(PhotoMetadata{}, "a.jpg").empty());
 }
 
 TEST(Photo, RefusesWithTheCause)
