@@ -1,8 +1,8 @@
+#include "tests/cli/json_file.h"
 #include "tests/cli/run_program.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include <filesystem>
 #include <functional>
@@ -16,12 +16,6 @@ using Json = nlohmann::ordered_json;
 using ::testing::HasSubstr;
 
 const fs::path kSample = fs::path(INSITU_SOURCE_DIR) / "samples" / "simulated-room";
-
-Json readJsonFile(const fs::path& path)
-{
-    std::ifstream stream(path);
-    return Json::parse(stream);
-}
 
 std::string bytesOf(const fs::path& path)
 {

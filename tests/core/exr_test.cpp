@@ -1,7 +1,7 @@
 #include "core/io/image_io.h"
 #include "core/random.h"
-#include "tests/core/errors.h"
 #include "tests/support/data.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tolerance.h"
 

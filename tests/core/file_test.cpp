@@ -1,6 +1,6 @@
 #include "core/io/file.h"
 
-#include "tests/core/errors.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 #include "core/io/model_io.h"
-#include "tests/core/errors.h"
 #include "tests/core/gltf_builder.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tolerance.h"
 

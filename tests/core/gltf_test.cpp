@@ -1,7 +1,7 @@
 #include "core/io/model_io.h"
-#include "tests/core/errors.h"
 #include "tests/core/gltf_builder.h"
 #include "tests/support/data.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tolerance.h"
 

@@ -1,8 +1,8 @@
 #include "core/check.h"
 #include "core/io/model_io.h"
-#include "tests/core/errors.h"
 #include "tests/core/gltf_builder.h"
 #include "tests/support/data.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 
 #include <gmock/gmock.h>

@@ -1,7 +1,7 @@
 #include "core/io/json.h"
 
 #include "core/io/file.h"
-#include "tests/core/errors.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 #include "core/mesh.h"
 
-#include "tests/core/errors.h"
+#include "tests/support/errors.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>

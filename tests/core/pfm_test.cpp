@@ -1,6 +1,6 @@
 #include "core/io/byte_writer.h"
 #include "core/io/image_io.h"
-#include "tests/core/errors.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 
 #include <gmock/gmock.h>

@@ -4,6 +4,7 @@
 #include "core/io/json.h"
 #include "pipeline/project_keys.h"
 #include "tests/support/data.h"
+#include "tests/support/errors.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tolerance.h"
 
@@ -71,13 +72,7 @@ protected:
     {
         Json json = good();
         change(json);
-        try {
-            (void)read(json);
-        } catch (const InputError& error) {
-            return error.what();
-        }
-        ADD_FAILURE() << "accepted: " << json.dump();
-        return "";
+        return inputErrorOf([&] { (void)read(json); });
     }
 
     TemporaryFolder folder_;
