@@ -103,11 +103,7 @@ void writeCamera(const std::filesystem::path& path, const CameraEstimate& estima
         const auto& point = estimate.vanishing_points_px[axis];
         json["vanishing_points_px"][kAxisNames[axis]] = point ? toJson(*point) : Json();
     }
-    json["findings"] = Json::array();
-    for (const Finding& finding : estimate.findings)
-        json["findings"].push_back({{"severity", severityName(finding.severity)},
-                                    {"code", finding.code},
-                                    {"message", finding.message}});
+    json["findings"] = toJson(estimate.findings);
     writeJson(path, json);
 }
 

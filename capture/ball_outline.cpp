@@ -53,8 +53,7 @@ void reportWeak(const BallOutline& ball, Findings& findings)
 
 BallOutlineResult findIn(const OutlinePicture& picture, const BallOutlineOptions& options)
 {
-    for (const Finding& finding : options.validate())
-        throw InputError("ball outline", finding.message);
+    requireValid(options.validate(), "ball outline options");
     BallOutlineResult result;
     if (options.start && !options.refine) {
         result.outline = detail::withShares(picture, *options.start);

@@ -30,24 +30,14 @@ void checkResponse(const ResponseCurve& response)
                                              table[z]));
 }
 
-void checkExcluded(const Bracket& bracket, const std::vector<Image<std::uint8_t>>* excluded)
+void checkMasks(const Bracket& bracket)
 {
-    if (excluded == nullptr) return;
-    INSITU_CHECK(excluded->size() == bracket.frames.size(),
-                 "{} masks for {} frames",
-                 excluded->size(),
-                 bracket.frames.size());
-    for (const auto& mask : *excluded)
-        INSITU_CHECK(mask.empty() || mask.sameSize(bracket.frames.front().image.codes),
-                     "a mask of {}x{}",
-                     mask.width(),
-                     mask.height());
-}
-
-bool hasMasks(const Bracket& bracket)
-{
-    return std::ranges::any_of(bracket.frames,
-                               [](const BracketFrame& frame) { return !frame.excluded.empty(); });
+    for (const BracketFrame& frame : bracket.frames)
+        INSITU_CHECK(frame.excluded.empty() || frame.excluded.sameSize(frame.image.codes),
+                     "{}: a mask of {}x{}",
+                     frame.name,
+                     frame.excluded.width(),
+                     frame.excluded.height());
 }
 
 /// 8-bit frames as 16-bit ones where a bracket has both.
@@ -145,18 +135,17 @@ Findings MergeOptions::validate() const
 
 MergeResult mergeBracket(const Bracket& bracket,
                          const ResponseCurve& response,
-                         const MergeOptions& options,
-                         const std::vector<Image<std::uint8_t>>* excluded)
+                         const MergeOptions& options)
 {
     requireValid(options.validate(), "merge options");
     INSITU_CHECK(!bracket.frames.empty(), "empty bracket");
     checkResponse(response);
-    checkExcluded(bracket, excluded);
+    checkMasks(bracket);
     const auto sameDepth = [&](const BracketFrame& frame) {
         return frame.image.max_code == bracket.frames.front().image.max_code;
     };
     if (!std::ranges::all_of(bracket.frames, sameDepth))
-        return mergeBracket(promoted(bracket), response, options, excluded);
+        return mergeBracket(promoted(bracket), response, options);
 
     MergeResult result;
     if (options.noise) {
@@ -166,12 +155,6 @@ MergeResult mergeBracket(const Bracket& bracket,
         result.noise = estimate.model;
         append(result.findings, std::move(estimate.findings));
     }
-    std::vector<Image<std::uint8_t>> own_masks;
-    if (excluded == nullptr && hasMasks(bracket)) {
-        for (const BracketFrame& frame : bracket.frames)
-            own_masks.push_back(frame.excluded);
-        excluded = &own_masks;
-    }
     const MergeTables tables(bracket, response, result.noise, options);
 
     const int width = bracket.frames.front().image.codes.width();
@@ -179,12 +162,12 @@ MergeResult mergeBracket(const Bracket& bracket,
     // First use of memory costs as much as many frames do: side by side.
     parallelFor(0, 2, [&](std::int64_t image) {
         (image == 0 ? result.radiance.pixels : result.variance) = Image<Rgb>(width, height);
-        (image == 0 ? result.validity : result.clipped) = Image<std::uint8_t>(width, height);
     });
+    result.validity = Image<std::uint8_t>(width, height);
     const int tasks = (height + kRowsPerTask - 1) / kRowsPerTask;
     parallelFor(0, tasks, [&](std::int64_t task) {
         const int first = static_cast<int>(task) * kRowsPerTask;
-        mergeRows(tables, excluded, first, std::min(first + kRowsPerTask, height), result);
+        mergeRows(tables, first, std::min(first + kRowsPerTask, height), result);
     });
     reportClipping(result);
     reportUseless(bracket, tables, result);

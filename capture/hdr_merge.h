@@ -30,7 +30,7 @@ enum MergeValidity : std::uint8_t {
     kMergeBlack = 2,
     /// Some channel rests on a single frame.
     kMergeSingleFrame = 4,
-    /// Some frame was excluded here by the caller's masks.
+    /// Some frame excludes this pixel (BracketFrame::excluded).
     kMergeExcluded = 8,
     /// Beside a clipped pixel in every frame: nothing could confirm it.
     kMergeUnconfirmed = 16,
@@ -42,11 +42,9 @@ struct MergeResult {
     /// NoiseModel on neighbours. Where a channel is clipped: its radiance squared. It knows nothing
     /// of an error of the response or of motion.
     Image<Rgb> variance;
-    Image<std::uint8_t> validity;  ///< bits of MergeValidity
-    /// Per pixel: 1 where some channel is clipped even in the shortest exposure: a lower bound.
-    Image<std::uint8_t> clipped;
-    double clipped_fraction = 0.0;
-    NoiseModel noise;  ///< as given or estimated
+    Image<std::uint8_t> validity;   ///< bits of MergeValidity
+    double clipped_fraction = 0.0;  ///< of the pixels, those with kMergeClipped
+    NoiseModel noise;               ///< as given or estimated
     /// "merge-clipped", "merge-all-clipped", "merge-all-black", "merge-useless-exposure" (a frame
     /// clipped or black everywhere, though others are not), "noise-model-assumed".
     Findings findings;
@@ -57,14 +55,11 @@ struct MergeResult {
 /// beside clipped pixels (3x3) are used where they agree with the longest frame that is clear of
 /// clipping: JPEG, demosaicing and blooming spoil neighbours.
 ///
-/// `excluded`: for each frame (order of bracket.frames) a mask of pixels not to be used (non-zero;
-/// something moved), of the bracket's size, or empty for none; nullptr: the frames' own masks
-/// (BracketFrame::excluded). Where every frame is excluded the masks are not followed.
-/// Memory: 26 bytes a pixel for the result. InputError: bad options; a response that is not finite
-/// and strictly increasing.
+/// Pixels that a frame excludes (BracketFrame::excluded) are taken from the others; where every
+/// frame is excluded the masks are not followed. Memory: 25 bytes a pixel for the result.
+/// InputError: bad options; a response that is not finite and strictly increasing.
 [[nodiscard]] MergeResult mergeBracket(const Bracket& bracket,
                                        const ResponseCurve& response,
-                                       const MergeOptions& options,
-                                       const std::vector<Image<std::uint8_t>>* excluded = nullptr);
+                                       const MergeOptions& options);
 
 }  // namespace insitu

@@ -5,6 +5,7 @@
 #include "capture/texel_average.h"
 #include "core/check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -54,10 +55,28 @@ LightProbe unwrapMirrorBall(const Image<Rgb>& radiance,
     const int width =
         options.width > 0 ? options.width : detail::widthForResolution(2.0 / ball.radius_px);
 
-    probe.environment = detail::averageOverTexels(
-        width,
-        [&](glm::dvec3 direction) { return picture.places(direction, 2.0 * pi / width); },
-        [&](glm::dvec3 direction) { return picture.seen(direction).radiance; });
+    const auto places = [&](glm::dvec3 direction) {
+        return picture.places(direction, 2.0 * pi / width);
+    };
+    if (options.clipped == nullptr) {
+        probe.environment.pixels = detail::averageOverTexels(
+            width, places, [&](glm::dvec3 d) { return picture.seen(d).radiance; });
+    } else {
+        const Image<std::uint8_t>& clipped = *options.clipped;
+        INSITU_CHECK(clipped.sameSize(radiance), "{}x{}", clipped.width(), clipped.height());
+        const auto seen = detail::averageOverTexels(width, places, [&](glm::dvec3 d) {
+            const detail::BallPicture::Sample sample = picture.seen(d);
+            const int x = std::clamp(static_cast<int>(sample.pixel.x), 0, clipped.width() - 1);
+            const int y = std::clamp(static_cast<int>(sample.pixel.y), 0, clipped.height() - 1);
+            return glm::vec4(sample.radiance, clipped(x, y) != 0 ? 1.0f : 0.0f);
+        });
+        probe.environment.pixels = Image<Rgb>(seen.width(), seen.height());
+        probe.environment.clipped = Image<float>(seen.width(), seen.height());
+        for (std::size_t i = 0; i < seen.pixelCount(); ++i) {
+            probe.environment.pixels.pixels()[i] = Rgb(seen.pixels()[i]);
+            probe.environment.clipped.pixels()[i] = seen.pixels()[i].w;
+        }
+    }
     detail::reportCoverage(picture, probe.findings);
     return probe;
 }

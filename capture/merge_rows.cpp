@@ -24,11 +24,8 @@ namespace {
 
 class RowMerger {
 public:
-    RowMerger(const MergeTables& tables,
-              const std::vector<Image<std::uint8_t>>* excluded,
-              MergeResult& result)
+    RowMerger(const MergeTables& tables, MergeResult& result)
         : tables_(tables),
-          excluded_(excluded),
           result_(result),
           count_(tables.frameCount()),
           width_(result.validity.width()),
@@ -107,13 +104,11 @@ private:
     /// Pixels of row y at which some frame is excluded.
     void findMasked(int y)
     {
-        any_masked_ = false;
-        if (excluded_ == nullptr) return;
         std::ranges::fill(masked_, std::uint8_t{0});
-        for (const Image<std::uint8_t>& mask : *excluded_) {
-            if (mask.empty()) continue;
+        for (const MergeFrame& frame : tables_.frames()) {
+            if (frame.excluded->empty()) continue;
             for (int x = 0; x < width_; ++x)
-                masked_[static_cast<std::size_t>(x)] |= mask(x, y);
+                masked_[static_cast<std::size_t>(x)] |= (*frame.excluded)(x, y);
         }
         any_masked_ = std::ranges::any_of(masked_, [](std::uint8_t m) { return m != 0; });
     }
@@ -159,9 +154,6 @@ private:
             }
             validity[x] = static_cast<std::uint8_t>(flags | black);
         }
-        std::uint8_t* clipped = result_.clipped.row(y).data();
-        for (int x = 0; x < width_; ++x)
-            clipped[x] = validity[x] & kMergeClipped;
     }
 
     /// Sums that need not wait for each other.
@@ -234,7 +226,8 @@ private:
     {
         allowed_.clear();
         for (int k = 0; k < count_; ++k) {
-            const Image<std::uint8_t>& mask = (*excluded_)[static_cast<std::size_t>(k)];
+            const Image<std::uint8_t>& mask =
+                *tables_.frames()[static_cast<std::size_t>(k)].excluded;
             if (mask.empty() || mask(x, y) == 0) allowed_.push_back(k);
         }
         if (allowed_.empty())
@@ -288,7 +281,6 @@ private:
     }
 
     const MergeTables& tables_;
-    const std::vector<Image<std::uint8_t>>* excluded_;
     MergeResult& result_;
     int count_;
     int width_;
@@ -306,13 +298,9 @@ private:
 
 }  // namespace
 
-void mergeRows(const MergeTables& tables,
-               const std::vector<Image<std::uint8_t>>* excluded,
-               int first,
-               int last,
-               MergeResult& result)
+void mergeRows(const MergeTables& tables, int first, int last, MergeResult& result)
 {
-    RowMerger(tables, excluded, result).run(first, last);
+    RowMerger(tables, result).run(first, last);
 }
 
 }  // namespace insitu

@@ -70,6 +70,7 @@ void MergeTables::buildFrames(const Bracket& bracket)
         INSITU_CHECK(frame.image.max_code == top, "{}: codes to {}", frame.name, top);
         MergeFrame merge_frame;
         merge_frame.image = &frame.image;
+        merge_frame.excluded = &frame.excluded;
         merge_frame.exposure = frame.relative_exposure;
         merge_frame.inverse_exposure = static_cast<float>(1.0 / frame.relative_exposure);
         merge_frame.clip_code = static_cast<int>(std::floor(options_.clip_fraction * top));

@@ -14,6 +14,7 @@ namespace insitu {
 /// One frame of the merge; codes in its own steps.
 struct MergeFrame {
     const EncodedImage* image = nullptr;
+    const Image<std::uint8_t>* excluded = nullptr;  ///< 1: not to be used; empty: all usable
     double exposure = 0.0;
     float inverse_exposure = 0.0f;
     int clip_code = 0;     ///< above: clipped

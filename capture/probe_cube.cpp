@@ -97,7 +97,7 @@ LightProbe probeFromCubeCross(const Image<Rgb>& radiance, int width)
     const int map_width = width > 0 ? width : detail::widthForResolution(source_radians);
     const int places = placesFor(2.0 * pi / map_width, source_radians);
     LightProbe probe;
-    probe.environment = detail::averageOverTexels(
+    probe.environment.pixels = detail::averageOverTexels(
         map_width,
         [&](glm::dvec3) { return places; },
         [&](glm::dvec3 direction) { return lookUpCross(radiance, faces, side, direction); });

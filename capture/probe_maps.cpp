@@ -40,7 +40,7 @@ LightProbe probeFromLatLong(const Image<Rgb>& radiance, int width)
         return probe;
     }
     const int places = placesFor(2.0 * pi / width, 2.0 * pi / radiance.width());
-    probe.environment = detail::averageOverTexels(
+    probe.environment.pixels = detail::averageOverTexels(
         width,
         [&](glm::dvec3) { return places; },
         [&](glm::dvec3 direction) { return lookUp(source, direction); });
@@ -61,7 +61,7 @@ LightProbe probeFromAngularMap(const Image<Rgb>& radiance, int width)
     const int map_width = width > 0 ? width : detail::widthForResolution(source_radians);
     const int places = placesFor(2.0 * pi / map_width, source_radians);
     LightProbe probe;
-    probe.environment = detail::averageOverTexels(
+    probe.environment.pixels = detail::averageOverTexels(
         map_width,
         [&](glm::dvec3) { return places; },
         [&](glm::dvec3 d) {

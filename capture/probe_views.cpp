@@ -88,28 +88,21 @@ TexelSums sumTexel(
     const BallPicture& picture, const Image<float>& free, glm::ivec2 texel, int width, int n)
 {
     TexelSums sums;
-    const int height = width / 2;
-    const double top = std::cos(pi * texel.y / height);
-    const double bottom = std::cos(pi * (texel.y + 1) / height);
-    for (int k = 0; k < n * n; ++k) {
-        const double cosine = top + (bottom - top) * (k / n + 0.5) / n;
-        const double sine = std::sqrt(std::max(1.0 - cosine * cosine, 0.0));
-        const double azimuth = 2.0 * pi * ((texel.x + (k % n + 0.5) / n) / width - 0.5);
-        const glm::dvec3 direction(sine * std::sin(azimuth), cosine, -sine * std::cos(azimuth));
+    detail::forEachPlace(width, texel, n, [&](glm::dvec3 direction) {
         const BallPicture::Sample sample = picture.seen(direction);
-        if (sample.outside) continue;
+        if (sample.outside) return;
         const double open = sampleBilinear(free, sample.pixel.x, sample.pixel.y);
-        if (open <= 0.0) continue;
+        if (open <= 0.0) return;
         if (sample.blind) {
             sums.rim += glm::dvec3(sample.radiance);
             ++sums.rim_count;
-            continue;
+            return;
         }
         const double resolution = picture.resolution(direction);
         const double weight = open * resolution * resolution;
         sums.radiance += weight * glm::dvec3(sample.radiance);
         sums.weight += weight;
-    }
+    });
     return sums;
 }
 
@@ -131,9 +124,7 @@ ViewMap unwrapView(const ProbeView& view,
     parallelFor(0, height, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
         for (int x = 0; x < width; ++x) {
-            const int n =
-                picture.places(environmentDirectionFromUv({(x + 0.5) / width, (y + 0.5) / height}),
-                               2.0 * pi / width);
+            const int n = picture.places(detail::middleOfTexel(width, {x, y}), 2.0 * pi / width);
             const TexelSums sums = sumTexel(picture, free, {x, y}, width, n);
             if (sums.weight > 0.0) {
                 map.radiance(x, y) = Rgb(sums.radiance / sums.weight);

@@ -1,6 +1,7 @@
 #include "capture/radiance_capture.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace insitu {
@@ -47,10 +48,14 @@ CapturedRadiance captureRadiance(Bracket bracket,
     } else {
         ResponseRecovery recovery = recoverResponse(bracket, options.response);
         result.response_known = !hasFinding(recovery.findings, "response-not-recoverable");
-        for (std::size_t i = 0; i < recovery.exposure_scale.size(); ++i)
+        for (std::size_t i = 0; i < recovery.exposure_scale.size(); ++i) {
             bracket.frames[i].relative_exposure *= recovery.exposure_scale[i];
-        for (std::size_t i = 0; i < result.frames.size(); ++i)
             result.frames[i].used_exposure = bracket.frames[i].relative_exposure;
+        }
+        // An exposure that was far off may stand elsewhere now.
+        std::ranges::stable_sort(
+            bracket.frames, std::greater<>(), &BracketFrame::relative_exposure);
+        std::ranges::stable_sort(result.frames, std::greater<>(), &CapturedFrame::used_exposure);
         result.held_out_error_codes = recovery.held_out_error_codes;
         result.response = std::move(recovery.curve);
         append(result.findings, std::move(recovery.findings));

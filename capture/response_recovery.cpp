@@ -126,11 +126,6 @@ ResponseRecovery recoverFromGroups(const Bracket& bracket,
     return recovery;
 }
 
-void checkOptions(const ResponseOptions& options)
-{
-    requireValid(options.validate(), "response options");
-}
-
 }  // namespace
 
 const char* responseMethodName(ResponseMethod method)
@@ -166,7 +161,7 @@ Findings ResponseOptions::validate() const
 
 ResponseRecovery recoverResponse(const Bracket& bracket, const ResponseOptions& options)
 {
-    checkOptions(options);
+    requireValid(options.validate(), "response options");
     INSITU_CHECK(!bracket.frames.empty(), "empty bracket");
     if (hasFinding(bracket.findings, "bracket-single-exposure"))
         return notRecoverable(bracket, "all images have the same exposure");

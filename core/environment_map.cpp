@@ -1,5 +1,6 @@
 #include "core/environment_map.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -20,6 +21,13 @@ glm::dvec3 environmentDirectionFromUv(glm::dvec2 uv)
     const double polar = uv.y * pi;
     const double s = std::sin(polar);
     return {s * std::sin(azimuth), std::cos(polar), -s * std::cos(azimuth)};
+}
+
+glm::ivec2 environmentTexelAt(int width, int height, glm::dvec3 unit_direction)
+{
+    const glm::dvec2 uv = environmentUvFromDirection(unit_direction);
+    return {std::clamp(static_cast<int>(uv.x * width), 0, width - 1),
+            std::clamp(static_cast<int>(uv.y * height), 0, height - 1)};
 }
 
 double environmentTexelSolidAngle(int width, int height, int y)

@@ -22,6 +22,8 @@ struct EnvironmentMap {
 [[nodiscard]] glm::dvec3 environmentDirectionFromUv(glm::dvec2 uv);
 /// Solid angle of a texel in row y: 2π/w · (cos θ₀ − cos θ₁).
 [[nodiscard]] double environmentTexelSolidAngle(int width, int height, int y);
+/// Column and row of the texel that a direction falls into.
+[[nodiscard]] glm::ivec2 environmentTexelAt(int width, int height, glm::dvec3 unit_direction);
 /// Bilinear look-up, wrapping in azimuth, clamped at the poles.
 [[nodiscard]] Rgb lookUp(const EnvironmentMap& environment, glm::dvec3 unit_direction);
 /// Irradiance of a surface with the given unit normal: Σ L cos ΔΩ over the upper hemisphere.

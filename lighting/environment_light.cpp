@@ -157,11 +157,9 @@ double EnvironmentLight::skyPdf(glm::dvec3 direction) const
 {
     const int width = environment_.pixels.width();
     const int height = environment_.pixels.height();
-    const glm::dvec2 uv = environmentUvFromDirection(direction);
-    const int x = std::clamp(static_cast<int>(uv.x * width), 0, width - 1);
-    const int y = std::clamp(static_cast<int>(uv.y * height), 0, height - 1);
-    const std::size_t texel =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    const glm::ivec2 at = environmentTexelAt(width, height, direction);
+    const std::size_t texel = static_cast<std::size_t>(at.y) * static_cast<std::size_t>(width) +
+                              static_cast<std::size_t>(at.x);
     return static_cast<double>(sky_density_[texel]);
 }
 

@@ -190,22 +190,18 @@ double RoomLight::texelPdf(std::size_t face, glm::dvec2 uv) const
 std::uint8_t RoomLight::outsideBand(glm::dvec3 direction) const
 {
     const Image<Rgb>& far = outside_.pixels;
-    const glm::dvec2 uv = environmentUvFromDirection(direction);
-    const int x = std::clamp(static_cast<int>(uv.x * far.width()), 0, far.width() - 1);
-    const int y = std::clamp(static_cast<int>(uv.y * far.height()), 0, far.height() - 1);
-    return outside_band_[static_cast<std::size_t>(y * far.width() + x)];
+    const glm::ivec2 texel = environmentTexelAt(far.width(), far.height(), direction);
+    return outside_band_[static_cast<std::size_t>(texel.y * far.width() + texel.x)];
 }
 
 double RoomLight::outsidePdf(glm::dvec3 direction) const
 {
     if (!(outside_share_ > 0.0)) return 0.0;
     const Image<Rgb>& far = outside_.pixels;
-    const glm::dvec2 uv = environmentUvFromDirection(direction);
-    const int x = std::clamp(static_cast<int>(uv.x * far.width()), 0, far.width() - 1);
-    const int y = std::clamp(static_cast<int>(uv.y * far.height()), 0, far.height() - 1);
+    const glm::ivec2 texel = environmentTexelAt(far.width(), far.height(), direction);
     return outside_share_ *
-           outside_table_->probability(static_cast<std::size_t>(y * far.width() + x)) /
-           environmentTexelSolidAngle(far.width(), far.height(), y);
+           outside_table_->probability(static_cast<std::size_t>(texel.y * far.width() + texel.x)) /
+           environmentTexelSolidAngle(far.width(), far.height(), texel.y);
 }
 
 std::optional<ProxyHit> RoomLight::intersect(glm::dvec3 x, glm::dvec3 direction) const

@@ -31,11 +31,9 @@ std::uint8_t bandOf(glm::vec3 direction, glm::vec3 nearest)
 float clippedShare(const EnvironmentMap& probe, glm::dvec3 direction)
 {
     if (probe.clipped.empty()) return 0.0f;
-    const glm::dvec2 uv = environmentUvFromDirection(direction);
-    const int x = static_cast<int>(uv.x * probe.clipped.width());
-    const int y = static_cast<int>(uv.y * probe.clipped.height());
-    return probe.clipped(std::clamp(x, 0, probe.clipped.width() - 1),
-                         std::clamp(y, 0, probe.clipped.height() - 1));
+    const glm::ivec2 texel =
+        environmentTexelAt(probe.clipped.width(), probe.clipped.height(), direction);
+    return probe.clipped(texel.x, texel.y);
 }
 
 }  // namespace

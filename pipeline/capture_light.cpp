@@ -34,7 +34,7 @@ EnvironmentMap readEnvironment(const std::filesystem::path& path)
 /// Light of the probe's picture, and which pixels are only a lower bound (empty: none).
 struct ProbePicture {
     Image<Rgb> radiance;
-    Image<Rgb> clipped;
+    Image<std::uint8_t> clipped;
 };
 
 /// Brackets of encoded photographs need a response; a single radiance file is linear already.
@@ -65,20 +65,11 @@ ProbePicture probePicture(const ProjectProbe& probe,
     MergeResult& merged = captured.merged;
     ProbePicture picture{std::move(merged.radiance.pixels), {}};
     if (merged.clipped_fraction > 0.0) {
-        picture.clipped = Image<Rgb>(merged.clipped.width(), merged.clipped.height());
-        for (std::size_t i = 0; i < merged.clipped.pixelCount(); ++i)
-            picture.clipped.pixels()[i] = Rgb(merged.clipped.pixels()[i]);
+        picture.clipped = std::move(merged.validity);
+        for (std::uint8_t& flags : picture.clipped.pixels())
+            flags &= kMergeClipped;
     }
     return picture;
-}
-
-/// From a picture of ones where it is clipped; a mirror that reflects little makes them larger.
-Image<float> clippedShareOf(const Image<Rgb>& image)
-{
-    Image<float> red(image.width(), image.height());
-    for (std::size_t i = 0; i < image.pixelCount(); ++i)
-        red.pixels()[i] = std::min(image.pixels()[i].r, 1.0f);
-    return red;
 }
 
 }  // namespace
@@ -99,12 +90,15 @@ CapturedLight captureLight(const Project& project,
     const ProbePicture picture = probePicture(probe, options, light);
     const Image<Rgb>& radiance = picture.radiance;
     if (probe.kind == ProbeKind::LatLong) {
-        light.environment = {radiance, clippedShareOf(picture.clipped)};
+        light.environment.pixels = radiance;
+        light.environment.clipped = Image<float>(picture.clipped.width(), picture.clipped.height());
+        std::ranges::copy(picture.clipped.pixels(), light.environment.clipped.pixels().begin());
         return light;
     }
 
     UnwrapOptions unwrap;
     unwrap.crop_origin_px = probe.crop_origin_px;
+    if (!picture.clipped.empty()) unwrap.clipped = &picture.clipped;
     unwrap.distance_to_room = [&](glm::dvec3 origin, glm::dvec3 direction) {
         const auto hit = proxy.intersect(origin, direction);
         return hit && !hit->opening ? hit->distance_m : kInfinity;
@@ -116,10 +110,6 @@ CapturedLight captureLight(const Project& project,
     LightProbe unwrapped = unwrapMirrorBall(radiance, probe.ball, camera, unwrap);
     append(light.findings, unwrapped.findings);
     light.environment = std::move(unwrapped.environment);
-    // Which texels are clipped is unwrapped as if it were light.
-    if (!picture.clipped.empty())
-        light.environment.clipped = clippedShareOf(
-            unwrapMirrorBall(picture.clipped, probe.ball, camera, unwrap).environment.pixels);
     return light;
 }
 

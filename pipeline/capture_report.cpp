@@ -2,7 +2,6 @@
 
 #include "core/io/file.h"
 #include "core/io/json.h"
-#include "pipeline/findings_json.h"
 
 #include <algorithm>
 #include <array>
@@ -74,7 +73,7 @@ void writeCaptureReport(const std::filesystem::path& path, const CapturedRadianc
                          {"held_out_error_codes", captured.held_out_error_codes},
                          {"noise", noiseJson(captured.merged.noise)},
                          {"clipped_fraction", captured.merged.clipped_fraction},
-                         {"findings", findingsJson(captured.findings)}};
+                         {"findings", toJson(captured.findings)}};
     writeJson(path, report);
 }
 

@@ -2,7 +2,6 @@
 
 #include "core/io/image_io.h"
 #include "core/io/json.h"
-#include "pipeline/findings_json.h"
 
 #include <numbers>
 
@@ -10,18 +9,13 @@ namespace insitu {
 
 namespace {
 
-Json vectorJson(glm::dvec3 v)
-{
-    return Json::array({v.x, v.y, v.z});
-}
-
 Json cameraJson(const CameraEstimate& estimate)
 {
     const Camera& camera = estimate.camera;
     return {{"focal_px", Json::array({camera.focal_px.x, camera.focal_px.y})},
             {"focal_px_sigma", estimate.focal_sigma_px},
-            {"position_m", vectorJson(camera.position_m)},
-            {"position_m_sigma", vectorJson(estimate.position_sigma_m)},
+            {"position_m", toJson(camera.position_m)},
+            {"position_m_sigma", toJson(estimate.position_sigma_m)},
             {"rotation_deg_sigma", estimate.rotation_sigma_rad * 180.0 / std::numbers::pi},
             {"residual_rms_px", estimate.residual_rms_px}};
 }
@@ -47,7 +41,7 @@ void writeReport(const std::filesystem::path& path,
         {"picture", picture.string()},
         {"camera", cameraJson(result.camera)},
         {"light",
-         {{"center_m", vectorJson(result.light.center_m)},
+         {{"center_m", toJson(result.light.center_m)},
           {"environment_px",
            Json::array({result.light.environment.pixels.width(),
                         result.light.environment.pixels.height()})},
@@ -67,7 +61,7 @@ void writeReport(const std::filesystem::path& path,
          {{"form", options.composite.form == CompositeForm::Ratio ? "ratio" : "difference"},
           {"influence_codes", options.composite.influence_codes},
           {"influence_fraction", result.composite.influence_fraction}}},
-        {"findings", findingsJson(result.findings)},
+        {"findings", toJson(result.findings)},
         {"seconds", times},
         {"from_cache", cached}};
     writeJson(path, report);

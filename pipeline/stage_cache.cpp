@@ -103,12 +103,13 @@ std::optional<std::string> StageCache::read(const ContentKey& key) const
     } catch (const InputError&) {
         return std::nullopt;
     }
-    // The checksum stands first; what is kept is found again by its time, newest used last.
+    // The checksum stands first.
     constexpr std::size_t kChecksum = 32;
     if (bytes.size() < kChecksum ||
         digits(XXH3_128bits(bytes.data() + kChecksum, bytes.size() - kChecksum)) !=
             bytes.substr(0, kChecksum))
         return std::nullopt;
+    // The file's time says when it was last of use, for trim().
     fs::last_write_time(path, fs::file_time_type::clock::now(), error);
     return bytes.substr(kChecksum);
 }

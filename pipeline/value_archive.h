@@ -35,95 +35,62 @@ public:
     }
 
 private:
+    /// What T, without const, is made of.
     template <class T>
-    static constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+    struct Shape {
+        static constexpr bool number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+        static constexpr bool list = false, optional = false, image = false, fixed = false;
+    };
     template <glm::length_t N, class T, glm::qualifier Q>
-    static std::true_type plainVector(const glm::vec<N, T, Q>*);
-    static std::false_type plainVector(const void*);
+    struct Shape<glm::vec<N, T, Q>> : Shape<T> {
+    };
+    template <class T>
+    struct Shape<std::vector<T>> : Shape<void> {
+        static constexpr bool list = true;
+    };
+    template <class T, std::size_t N>
+    struct Shape<std::array<T, N>> : Shape<void> {
+        static constexpr bool fixed = true;
+    };
+    template <class T>
+    struct Shape<std::optional<T>> : Shape<void> {
+        static constexpr bool optional = true;
+    };
+    template <class T>
+    struct Shape<Image<T>> : Shape<void> {
+        static constexpr bool image = true;
+    };
 
     template <class T>
     void visit(T& value)
     {
-        using Plain = std::remove_const_t<T>;
-        if constexpr (kPlain<Plain> || decltype(plainVector(static_cast<Plain*>(nullptr)))::value)
+        using S = Shape<std::remove_const_t<T>>;
+        if constexpr (S::number)
             sink_.raw(&value, sizeof(value));
+        else if constexpr (PartsOf<T, std::string>)
+            visitText(value);
+        else if constexpr (S::list)
+            visitList(value);
+        else if constexpr (S::fixed)
+            visitEach(value);
+        else if constexpr (S::optional)
+            visitOptional(value);
+        else if constexpr (S::image)
+            visitImage(value);
         else
-            container(value);
+            parts(*this, value);
     }
-
-    template <class T>
-    void container(T& value)
+    void visitText(auto& text)
     {
-        parts(*this, value);
+        visitSize(text);
+        sink_.raw(text.data(), text.size());
     }
-    void container(PartsOf<std::string> auto& value)
+    void visitList(auto& list)
     {
-        resize(value);
-        sink_.raw(value.data(), value.size());
+        visitSize(list);
+        visitEach(list);
     }
-    template <class T>
-    void container(std::vector<T>& value)
-    {
-        resize(value);
-        elements(value);
-    }
-    template <class T>
-    void container(const std::vector<T>& value)
-    {
-        resize(value);
-        elements(value);
-    }
-    template <class T, std::size_t N>
-    void container(std::array<T, N>& value)
-    {
-        elements(value);
-    }
-    template <class T, std::size_t N>
-    void container(const std::array<T, N>& value)
-    {
-        elements(value);
-    }
-    template <class T>
-    void container(std::optional<T>& value)
-    {
-        bool present = value.has_value();
-        visit(present);
-        if constexpr (Sink::reading) {
-            value.reset();
-            if (present) value.emplace();
-        }
-        if (present) visit(*value);
-    }
-    template <class T>
-    void container(const std::optional<T>& value)
-    {
-        const bool present = value.has_value();
-        visit(present);
-        if (present) visit(*value);
-    }
-    template <class T>
-    void container(Image<T>& image)
-    {
-        int width = image.width();
-        int height = image.height();
-        (*this)(width, height);
-        if constexpr (Sink::reading) {
-            sink_.demand(sizeof(T), width, height);
-            image = Image<T>(width, height);
-        }
-        sink_.raw(image.pixels().data(), image.pixels().size_bytes());
-    }
-    template <class T>
-    void container(const Image<T>& image)
-    {
-        const int width = image.width();
-        const int height = image.height();
-        (*this)(width, height);
-        sink_.raw(image.pixels().data(), image.pixels().size_bytes());
-    }
-
-    template <class Range>
-    void resize(Range& range)
+    void visitSize(auto& range)
     {
         std::uint64_t size = range.size();
         visit(size);
@@ -132,11 +99,32 @@ private:
             range.resize(size);
         }
     }
-    template <class Range>
-    void elements(Range& range)
+    void visitEach(auto& range)
     {
         for (auto& element : range)
             visit(element);
+    }
+    void visitOptional(auto& optional)
+    {
+        bool present = optional.has_value();
+        visit(present);
+        if constexpr (Sink::reading) {
+            optional.reset();
+            if (present) optional.emplace();
+        }
+        if (present) visit(*optional);
+    }
+    void visitImage(auto& image)
+    {
+        int width = image.width();
+        int height = image.height();
+        (*this)(width, height);
+        if constexpr (Sink::reading) {
+            using Picture = std::remove_cvref_t<decltype(image)>;
+            sink_.demand(sizeof(image.pixels()[0]), width, height);
+            image = Picture(width, height);
+        }
+        sink_.raw(image.pixels().data(), image.pixels().size_bytes());
     }
 
     Sink& sink_;

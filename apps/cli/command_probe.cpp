@@ -55,18 +55,22 @@ void placeOutline(const Image<Rgb>& radiance,
             ball.center_px = found.outline->center_px;
             ball.radius_px = found.outline->radius_px;
         }
-        findings.push_back(
-            {found.outline ? Severity::Info : Severity::Warning,
-             found.outline ? "probe-outline-found" : "probe-outline-assumed",
-             fmt::format(
-                 "the ball's outline {} centre ({:.1f}, {:.1f}), radius {:.1f} px; --center "
-                 "and --radius give another",
-                 found.outline ? "was found:"
-                               : "was not found and is taken to fill the "
-                                 "picture:",
-                 ball.center_px.x,
-                 ball.center_px.y,
-                 ball.radius_px)});
+        const std::string outline = fmt::format(
+            "centre ({:.1f}, {:.1f}), radius {:.1f} px; "
+            "--center and --radius give another",
+            ball.center_px.x,
+            ball.center_px.y,
+            ball.radius_px);
+        if (found.outline)
+            findings.push_back({Severity::Info,
+                                "probe-outline-found",
+                                "the ball's outline was found: " + outline});
+        else
+            findings.push_back({Severity::Warning,
+                                "probe-outline-assumed",
+                                "the ball's outline was not found and is taken to fill the "
+                                "picture: " +
+                                    outline});
     }
     if (arguments.center_px)
         ball.center_px = {(*arguments.center_px)[0], (*arguments.center_px)[1]};

@@ -233,6 +233,16 @@ std::optional<std::string> didYouMean(std::string_view word,
     return best;
 }
 
+Json toJson(const Findings& findings)
+{
+    Json list = Json::array();
+    for (const Finding& finding : findings)
+        list.push_back({{"severity", severityName(finding.severity)},
+                        {"code", finding.code},
+                        {"message", finding.message}});
+    return list;
+}
+
 Json toJson(const ResponseCurve& curve)
 {
     Json json;

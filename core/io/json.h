@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/finding.h"
 #include "core/response_curve.h"
 
 #include <glm/glm.hpp>
@@ -64,6 +65,8 @@ private:
     std::string_view word, std::initializer_list<std::string_view> candidates);
 
 [[nodiscard]] Json toJson(const ResponseCurve& curve);
+/// A list of {"severity", "code", "message"}.
+[[nodiscard]] Json toJson(const Findings& findings);
 [[nodiscard]] ResponseCurve responseFromJson(const JsonNode& node);
 
 }  // namespace insitu

@@ -92,8 +92,8 @@ TEST(MergeBracket, ClippedEverywhereIsTheShortestAndALowerBound)
     const Bracket bracket =
         makeBracket({frameOf({255, 128, 128, 128}, 4.0), frameOf({252, 64, 64, 64}, 1.0)});
     const MergeResult merged = mergeBracket(bracket, squares(), {});
-    EXPECT_EQ(merged.clipped(0, 0), 1);
-    EXPECT_EQ(merged.clipped(3, 0), 0);
+    EXPECT_TRUE(merged.validity(0, 0) & kMergeClipped);
+    EXPECT_FALSE(merged.validity(3, 0) & kMergeClipped);
     EXPECT_EQ(merged.validity(0, 0), kMergeClipped);
     EXPECT_FLOAT_EQ(merged.variance(0, 0).g, std::pow(252.0f * 252.0f / 65536.0f, 2.0f));
     // Beside it, no frame is clear: believed, and said so. Two pixels away one is.
@@ -121,7 +121,7 @@ TEST(MergeBracket, PrefersBlackToClipped)
     const Bracket bracket = makeBracket({frameOf({255, 128}, 1000.0), frameOf({2, 64}, 1.0)});
     const MergeResult merged = mergeBracket(bracket, squares(), {});
     EXPECT_FLOAT_EQ(merged.radiance.pixels(0, 0).g, 4.0f / 65536.0f);
-    EXPECT_EQ(merged.clipped(0, 0), 0);
+    EXPECT_FALSE(merged.validity(0, 0) & kMergeClipped);
 }
 
 TEST(MergeBracket, AllClippedAndAllBlackAreFindings)
@@ -234,14 +234,14 @@ TEST(MergeBracket, DoesNotDependOnTheNumberOfThreads)
 {
     SyntheticCamera camera = plainCamera(255);
     camera.shot_variance = 2.5e-4;
-    const Bracket bracket = photograph(tiles(64, 48, 8, 0.02, 50.0), {1.0, 0.25, 1.0 / 16}, camera);
-    std::vector<Image<std::uint8_t>> masks(3, Image<std::uint8_t>(64, 48));
+    Bracket bracket = photograph(tiles(64, 48, 8, 0.02, 50.0), {1.0, 0.25, 1.0 / 16}, camera);
+    bracket.frames[1].excluded = Image<std::uint8_t>(64, 48);
     for (int y = 10; y < 40; ++y)
-        masks[1](y, y) = 1;
+        bracket.frames[1].excluded(y, y) = 1;
     setThreadCount(1);
-    const MergeResult one = mergeBracket(bracket, tableOf(camera), {}, &masks);
+    const MergeResult one = mergeBracket(bracket, tableOf(camera), {});
     setThreadCount(4);
-    const MergeResult four = mergeBracket(bracket, tableOf(camera), {}, &masks);
+    const MergeResult four = mergeBracket(bracket, tableOf(camera), {});
     setThreadCount(0);
     EXPECT_EQ(one.radiance.pixels, four.radiance.pixels);
     EXPECT_EQ(one.variance, four.variance);
@@ -284,10 +284,9 @@ struct Exclusion {
 TEST(MergeBracket, ExcludedPixelsAreAsIfTheFrameWereNotThere)
 {
     for (const std::size_t without : {0u, 1u, 3u}) {
-        const Exclusion given(without);
-        std::vector<Image<std::uint8_t>> masks(4);
-        masks[without] = Image<std::uint8_t>(64, 48, 1);
-        const MergeResult merged = mergeBracket(given.all, given.response, given.options, &masks);
+        Exclusion given(without);
+        given.all.frames[without].excluded = Image<std::uint8_t>(64, 48, 1);
+        const MergeResult merged = mergeBracket(given.all, given.response, given.options);
         expectSame(merged, mergeBracket(given.rest, given.response, given.options));
         for (const std::uint8_t flags : merged.validity.pixels())
             EXPECT_TRUE(flags & kMergeExcluded);
@@ -296,12 +295,11 @@ TEST(MergeBracket, ExcludedPixelsAreAsIfTheFrameWereNotThere)
 
 TEST(MergeBracket, ExcludesOnlyWhereTheMaskSaysSo)
 {
-    const Exclusion given(1);
-    std::vector<Image<std::uint8_t>> masks(4);
-    masks[1] = Image<std::uint8_t>(64, 48);
-    masks[1](20, 30) = 1;
+    Exclusion given(1);
     const MergeResult plain = mergeBracket(given.all, given.response, given.options);
-    MergeResult merged = mergeBracket(given.all, given.response, given.options, &masks);
+    given.all.frames[1].excluded = Image<std::uint8_t>(64, 48);
+    given.all.frames[1].excluded(20, 30) = 1;
+    MergeResult merged = mergeBracket(given.all, given.response, given.options);
     EXPECT_EQ(merged.validity(20, 30), plain.validity(20, 30) | kMergeExcluded);
     const float change = merged.radiance.pixels(20, 30).g - plain.radiance.pixels(20, 30).g;
     EXPECT_GT(std::abs(change), 1e-4f * plain.radiance.pixels(20, 30).g);  // noise, not rounding
@@ -311,19 +309,18 @@ TEST(MergeBracket, ExcludesOnlyWhereTheMaskSaysSo)
 
 TEST(MergeBracket, MasksOfEveryFrameAreNotFollowed)
 {
-    const Exclusion given(1);
-    const std::vector<Image<std::uint8_t>> masks(4, Image<std::uint8_t>(64, 48, 1));
-    expectSame(mergeBracket(given.all, given.response, given.options, &masks),
-               mergeBracket(given.all, given.response, given.options));
+    Exclusion given(1);
+    const MergeResult plain = mergeBracket(given.all, given.response, given.options);
+    for (BracketFrame& frame : given.all.frames)
+        frame.excluded = Image<std::uint8_t>(64, 48, 1);
+    expectSame(mergeBracket(given.all, given.response, given.options), plain);
 }
 
 TEST(MergeBracket, MasksMustFit)
 {
-    const Exclusion given(1);
-    const std::vector<Image<std::uint8_t>> few(3);
-    EXPECT_THROW((void)mergeBracket(given.all, given.response, given.options, &few), LogicError);
-    const std::vector<Image<std::uint8_t>> small(4, Image<std::uint8_t>(9, 9));
-    EXPECT_THROW((void)mergeBracket(given.all, given.response, given.options, &small), LogicError);
+    Exclusion given(1);
+    given.all.frames[2].excluded = Image<std::uint8_t>(9, 9);
+    EXPECT_THROW((void)mergeBracket(given.all, given.response, given.options), LogicError);
 }
 
 TEST(MergeBracket, WhiteAndBlackFramesAddNothingAndAreNamed)

@@ -17,22 +17,9 @@ constexpr double kBoundError = 0.05;  ///< asked of the RMS error, relative to t
 constexpr double kCover1 = 0.03;      ///< asked of the coverage of one deviation
 constexpr double kCover2 = 0.02;      ///< and of 1.96
 
-/// A toe and a shoulder of its own for each channel: bright codes span wide steps of exposure.
-double shoulder(int c, double e)
-{
-    const double knee = 0.35 + 0.1 * c;
-    const double p = std::pow(e, 0.75);
-    return (1.0 + knee) * p / (p + knee);
-}
-
 SyntheticCamera cameraOf(double shot, double read, int max_code = 255)
 {
-    SyntheticCamera camera;
-    camera.curve = shoulder;
-    camera.shot_variance = shot;
-    camera.read_variance = read;
-    camera.max_code = max_code;
-    return camera;
+    return shoulderCamera(0.75, shot, read, max_code);
 }
 
 NoiseModel noiseOf(const SyntheticCamera& camera)

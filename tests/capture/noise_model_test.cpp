@@ -11,22 +11,9 @@ namespace {
 
 constexpr double kNoiseError = 0.1;  ///< asked of variances; the sample itself leaves 2 to 5 %
 
-/// A shoulder of its own for each channel.
-double shoulder(int c, double e)
-{
-    const double knee = 0.35 + 0.1 * c;
-    const double p = std::pow(e, 0.7);
-    return (1.0 + knee) * p / (p + knee);
-}
-
 SyntheticCamera cameraOf(double shot, double read, int max_code = 255)
 {
-    SyntheticCamera camera;
-    camera.curve = shoulder;
-    camera.shot_variance = shot;
-    camera.read_variance = read;
-    camera.max_code = max_code;
-    return camera;
+    return shoulderCamera(0.7, shot, read, max_code);
 }
 
 /// Six octaves of brightness; `contrast` is the amplitude of texture on every pixel.

@@ -24,6 +24,22 @@ struct SyntheticCamera {
     std::uint64_t seed = 1;
 };
 
+/// A camera with a toe and a shoulder of its own for each channel, exposure^power at the dark end:
+/// bright codes span wide steps of exposure.
+inline SyntheticCamera shoulderCamera(double power, double shot, double read, int max_code = 255)
+{
+    SyntheticCamera camera;
+    camera.curve = [power](int c, double e) {
+        const double knee = 0.35 + 0.1 * c;
+        const double p = std::pow(e, power);
+        return (1.0 + knee) * p / (p + knee);
+    };
+    camera.shot_variance = shot;
+    camera.read_variance = read;
+    camera.max_code = max_code;
+    return camera;
+}
+
 /// Photographs `radiance` with each of the exposures, seconds.
 inline Bracket photograph(const Image<Rgb>& radiance,
                           const std::vector<double>& seconds,
