@@ -14,16 +14,6 @@ constexpr const char* kAxisNames[] = {"x", "y", "z"};
 /// Other programs write axes with few digits; what is further off is no rotation.
 constexpr double kOrthonormal = 1e-3;
 
-Json toJson(glm::dvec2 v)
-{
-    return Json::array({v.x, v.y});
-}
-
-Json toJson(glm::dvec3 v)
-{
-    return Json::array({v.x, v.y, v.z});
-}
-
 Severity severityFrom(const JsonNode& node)
 {
     const std::string text = node.text();

@@ -233,6 +233,16 @@ std::optional<std::string> didYouMean(std::string_view word,
     return best;
 }
 
+Json toJson(glm::dvec2 v)
+{
+    return Json::array({v.x, v.y});
+}
+
+Json toJson(glm::dvec3 v)
+{
+    return Json::array({v.x, v.y, v.z});
+}
+
 Json toJson(const Findings& findings)
 {
     Json list = Json::array();

@@ -64,6 +64,9 @@ private:
 [[nodiscard]] std::optional<std::string> didYouMean(
     std::string_view word, std::initializer_list<std::string_view> candidates);
 
+/// A list of the components.
+[[nodiscard]] Json toJson(glm::dvec2 v);
+[[nodiscard]] Json toJson(glm::dvec3 v);
 [[nodiscard]] Json toJson(const ResponseCurve& curve);
 /// A list of {"severity", "code", "message"}.
 [[nodiscard]] Json toJson(const Findings& findings);
