@@ -196,7 +196,7 @@ Project readProject(const std::filesystem::path& path)
     for (std::size_t i = 0; i < objects.size(); ++i)
         project.objects.push_back(readObject(objects.at(i), folder));
     if (project.objects.empty()) objects.fail("is empty; name at least one model to insert");
-    project.room = readRoom(root.at("room"), folder);
+    project.room = readRoomOrFile(root.at("room"), folder);
     checkInsideRoom(objects, project);
     return project;
 }

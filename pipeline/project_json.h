@@ -22,6 +22,14 @@ namespace insitu {
                                             const std::filesystem::path& folder);
 /// The whole `room` list.
 [[nodiscard]] RoomDescription readRoom(const JsonNode& node, const std::filesystem::path& folder);
+/// The same, or the name of a file that holds it: by itself, or as its `room`.
+[[nodiscard]] RoomDescription readRoomOrFile(const JsonNode& node,
+                                             const std::filesystem::path& folder);
+/// An entry of `room` of type "primitive", placed.
+[[nodiscard]] RoomPrimitive readPrimitive(const JsonNode& node,
+                                          const std::filesystem::path& folder);
+/// A box turned about the vertical through its centre.
+[[nodiscard]] RoomPrimitive turnedBox(const RoomBox& box, double rotation_y_deg);
 /// `min_m` and `max_m` of a box, checked.
 [[nodiscard]] RoomBox readBox(const JsonNode& node);
 /// `corners_m`: at least three points of a flat convex polygon.

@@ -28,7 +28,11 @@ inline const KeyList kBall = {
 inline const KeyList kView = {"position_m"};
 inline const KeyList kFloor = {"type", "height_m", "half_size_m"};
 inline const KeyList kPlane = {"type", "corner_m", "edge_u_m", "edge_v_m", "corners_m"};
-inline const KeyList kBox = {"type", "min_m", "max_m", "solid", "name"};
+inline const KeyList kBox = {"type", "min_m", "max_m", "rotation_y_deg", "solid", "name"};
+inline const KeyList kPrimitive = {
+    "type", "shape", "library", "parameters", "position_m", "rotation_y_deg", "solid", "name"};
+inline const KeyList kRoomFile = {
+    "format", "version", "room", "primitives", "constraints", "summary", "findings", "note"};
 inline const KeyList kMesh = {
     "type", "model", "position_m", "rotation_y_deg", "scale", "pivot", "name"};
 inline const KeyList kOpening = {"type", "corners_m", "name"};

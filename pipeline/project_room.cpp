@@ -154,15 +154,21 @@ RoomDescription readRoom(const JsonNode& node, const std::filesystem::path& fold
     for (std::size_t i = 0; i < node.size(); ++i) {
         const JsonNode item = node.at(i);
         const std::string type =
-            readChoice(item.at("type"), {"floor", "plane", "box", "mesh", "opening"});
+            readChoice(item.at("type"), {"floor", "plane", "box", "primitive", "mesh", "opening"});
         if (type == "floor") room.floors.push_back(readFloor(item));
         if (type == "plane") room.planes.push_back(readPlane(item));
         if (type == "mesh") room.meshes.push_back(readMesh(item, folder));
         if (type == "opening") room.openings.push_back(readOpening(item));
         if (type == "box") {
             item.expectKeys(keys::kBox);
-            room.boxes.push_back(readBox(item));
+            const double turn =
+                item.has("rotation_y_deg") ? item.at("rotation_y_deg").number() : 0.0;
+            if (turn == 0.0)
+                room.boxes.push_back(readBox(item));
+            else
+                room.primitives.push_back(turnedBox(readBox(item), turn));
         }
+        if (type == "primitive") room.primitives.push_back(readPrimitive(item, folder));
     }
     if (room.empty())
         node.fail("names no surface; give at least {\"type\": \"floor\"} or the room's box");

@@ -76,6 +76,43 @@ bool restsOnRoom(const ProxyFace& face, const RoomDescription& room)
     return false;
 }
 
+/// A parallelogram stays one face; other convex polygons become triangles around their first
+/// corner.
+std::vector<ProxyFace> polygonFaces(const std::vector<glm::dvec3>& corners,
+                                    const std::string& name,
+                                    bool two_sided)
+{
+    if (corners.size() == 4) {
+        const glm::dvec3 u = corners[1] - corners[0];
+        const glm::dvec3 v = corners[3] - corners[0];
+        const double off = glm::length(corners[2] - corners[0] - u - v);
+        if (off <= 1e-9 * (glm::length(u) + glm::length(v)))
+            return {makeFace(corners[0], u, v, name, two_sided)};
+    }
+    std::vector<ProxyFace> faces;
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
+        ProxyFace face = makeFace(
+            corners[0], corners[i] - corners[0], corners[i + 1] - corners[0], name, two_sided);
+        face.triangle = true;
+        // Corners in a line give a triangle without area.
+        if (std::isfinite(face.normal.x)) faces.push_back(std::move(face));
+    }
+    return faces;
+}
+
+std::vector<ProxyFace> primitiveFaces(const RoomPrimitive& primitive, const RoomDescription& room)
+{
+    std::vector<ProxyFace> faces;
+    const std::string body = primitive.name.empty() ? "primitive" : primitive.name;
+    for (const WorldFace& polygon : primitive.faces)
+        for (ProxyFace& face :
+             polygonFaces(polygon.corners_m, body + " " + polygon.name, primitive.two_sided)) {
+            face.solid = primitive.solid;
+            if (!primitive.solid || !restsOnRoom(face, room)) faces.push_back(std::move(face));
+        }
+    return faces;
+}
+
 std::vector<ProxyFace> collectFaces(const RoomDescription& room)
 {
     std::vector<ProxyFace> faces;
@@ -93,6 +130,11 @@ std::vector<ProxyFace> collectFaces(const RoomDescription& room)
             if (!box.solid || !restsOnRoom(face, room)) faces.push_back(std::move(face));
         }
     }
+    for (std::size_t index = 0; index < room.primitives.size(); ++index)
+        for (ProxyFace& face : primitiveFaces(room.primitives[index], room)) {
+            face.box = static_cast<int>(room.boxes.size() + index);
+            faces.push_back(std::move(face));
+        }
     for (const RoomMesh& mesh : room.meshes) {
         for (const glm::uvec3& t : mesh.mesh.triangles) {
             const glm::dvec3 a(mesh.mesh.positions[t.x]);

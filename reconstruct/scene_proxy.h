@@ -2,6 +2,7 @@
 
 #include "core/finding.h"
 #include "core/mesh.h"
+#include "reconstruct/primitive.h"
 #include "reconstruct/ray_scene.h"
 
 #include <glm/glm.hpp>
@@ -30,6 +31,13 @@ struct RoomMesh {
     TriangleMesh mesh;  ///< already placed in the world
     std::string name;
 };
+/// A primitive (primitive.h) where it stands: flat convex faces.
+struct RoomPrimitive {
+    std::vector<WorldFace> faces;
+    bool two_sided = false;
+    bool solid = true;  ///< a stand-in for furniture; false: part of the room itself
+    std::string name;
+};
 struct RoomOpening {
     std::vector<glm::dvec3> corners_m;  ///< convex, planar polygon, >= 3 corners
 };
@@ -38,11 +46,13 @@ struct RoomDescription {
     std::vector<RoomPlane> planes;
     std::vector<RoomBox> boxes;
     std::vector<RoomMesh> meshes;
+    std::vector<RoomPrimitive> primitives;
     std::vector<RoomOpening> openings;
 
     [[nodiscard]] bool empty() const
     {
-        return floors.empty() && planes.empty() && boxes.empty() && meshes.empty();
+        return floors.empty() && planes.empty() && boxes.empty() && meshes.empty() &&
+               primitives.empty();
     }
 };
 
@@ -52,8 +62,9 @@ struct ProxyFace {
     glm::dvec3 corner{0.0}, edge_u{0.0}, edge_v{0.0}, normal{0.0};
     bool triangle = false;
     bool two_sided = false;
-    bool solid = false;  ///< of a solid box: a stand-in for furniture, which may have gaps
-    int box = -1;        ///< index in RoomDescription::boxes, or none
+    bool solid = false;  ///< of a solid: a stand-in for furniture, which may have gaps
+    /// Which body it belongs to: index in RoomDescription::boxes, then in its primitives; or none.
+    int box = -1;
     std::string name;
     std::vector<std::size_t> openings;  ///< indices of openings that are cut into this face
 };

@@ -119,7 +119,7 @@ void JsonNode::fail(const std::string& cause) const
     throw InputError(file_, position_, cause);
 }
 
-void JsonNode::expectKeys(std::initializer_list<std::string_view> allowed) const
+void JsonNode::expectKeys(std::span<const std::string_view> allowed) const
 {
     if (!value_->is_object())
         fail(fmt::format("must be an object {{…}}, not {}", typeName(*value_)));
@@ -219,7 +219,7 @@ glm::dvec3 JsonNode::vec3() const
 }
 
 std::optional<std::string> didYouMean(std::string_view word,
-                                      std::initializer_list<std::string_view> candidates)
+                                      std::span<const std::string_view> candidates)
 {
     std::optional<std::string> best;
     std::size_t best_distance = std::max<std::size_t>(word.size() / 3, 2) + 1;

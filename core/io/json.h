@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -37,7 +38,11 @@ public:
     [[nodiscard]] const std::string& position() const { return position_; }
 
     /// This must be an object with no other keys than these; else an error with "did you mean".
-    void expectKeys(std::initializer_list<std::string_view> allowed) const;
+    void expectKeys(std::span<const std::string_view> allowed) const;
+    void expectKeys(std::initializer_list<std::string_view> allowed) const
+    {
+        expectKeys(std::span(allowed.begin(), allowed.size()));
+    }
     [[nodiscard]] bool has(std::string_view key) const;
     [[nodiscard]] JsonNode at(std::string_view key) const;  ///< error when missing
     [[nodiscard]] std::optional<JsonNode> find(std::string_view key) const;
@@ -61,8 +66,13 @@ private:
 };
 
 /// The nearest of `candidates` to `word` by edit distance, when near enough to be meant.
-[[nodiscard]] std::optional<std::string> didYouMean(
-    std::string_view word, std::initializer_list<std::string_view> candidates);
+[[nodiscard]] std::optional<std::string> didYouMean(std::string_view word,
+                                                    std::span<const std::string_view> candidates);
+[[nodiscard]] inline std::optional<std::string> didYouMean(
+    std::string_view word, std::initializer_list<std::string_view> candidates)
+{
+    return didYouMean(word, std::span(candidates.begin(), candidates.size()));
+}
 
 /// A list of the components.
 [[nodiscard]] Json toJson(glm::dvec2 v);

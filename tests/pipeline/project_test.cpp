@@ -392,6 +392,7 @@ TEST(ProjectSchema, NamesTheParsersKeys)
                                                          {"floor", keys::kFloor},
                                                          {"plane", keys::kPlane},
                                                          {"box", keys::kBox},
+                                                         {"primitive", keys::kPrimitive},
                                                          {"mesh", keys::kMesh},
                                                          {"opening", keys::kOpening},
                                                          {"object", keys::kObject},
