@@ -1,0 +1,36 @@
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include <cstddef>
+
+namespace insitu {
+
+/// One direction of a pair: ω itself (side 0) or −ω (side 1).
+struct DirectedPair {
+    std::size_t pair = 0;
+    int side = 0;
+    [[nodiscard]] bool operator==(const DirectedPair&) const = default;
+};
+
+/// The sphere of directions as the texels of a cube, ω and −ω taken together.
+///
+/// 6·n² cells, so 3·n² pairs. Pair (axis·n + row)·n + column looks through the texel's centre on
+/// the face of the positive axis; its other side is the opposite texel of the opposite face. Column
+/// runs along the next axis (x → y → z → x), row along the one after.
+struct DirectionCells {
+    int face_size = 32;
+
+    [[nodiscard]] std::size_t pairCount() const
+    {
+        return 3 * static_cast<std::size_t>(face_size) * static_cast<std::size_t>(face_size);
+    }
+    /// Unit direction through the centre of the cell of side 0.
+    [[nodiscard]] glm::dvec3 direction(std::size_t pair) const;
+    /// Exact solid angle of either cell of the pair; all of them sum to 4π.
+    [[nodiscard]] double solidAngle(std::size_t pair) const;
+    /// The cell that a direction of any length > 0 falls into.
+    [[nodiscard]] DirectedPair cellAt(glm::dvec3 direction) const;
+};
+
+}  // namespace insitu
