@@ -13,6 +13,8 @@ namespace {
 constexpr const char* kAxisNames[] = {"x", "y", "z"};
 /// Other programs write axes with few digits; what is further off is no rotation.
 constexpr double kOrthonormal = 1e-3;
+/// As for the lines (calib/line_segments.cpp).
+constexpr double kMaxDivision = 0.5;
 
 Severity severityFrom(const JsonNode& node)
 {
@@ -38,13 +40,29 @@ void settleAxes(const JsonNode& root, Camera& camera)
     camera.up = glm::cross(camera.right, camera.forward);
 }
 
-void readDistortion(const JsonNode& root)
+/// {"division": λ}, or the empty list (zeros, null) of other programs for none.
+double readDistortion(const JsonNode& root)
 {
     const auto distortion = root.find("distortion");
-    if (!distortion || distortion->value().is_null()) return;
+    if (!distortion || distortion->value().is_null()) return 0.0;
+    if (distortion->value().is_object()) {
+        distortion->expectKeys({"division"});
+        const JsonNode node = distortion->at("division");
+        const double division = node.number();
+        if (std::abs(division) > kMaxDivision)
+            node.fail(fmt::format("must lie within ±{}", kMaxDivision));
+        return division;
+    }
     for (std::size_t i = 0; i < distortion->size(); ++i)
         if (distortion->at(i).number() != 0.0)
-            distortion->fail("lens distortion is not modelled; undistort the photograph first");
+            distortion->fail("coefficients of an unknown model; use {\"division\": λ}");
+    return 0.0;
+}
+
+Json distortionJson(const Camera& camera)
+{
+    if (camera.division == 0.0) return Json::array();
+    return {{"division", camera.division}};
 }
 
 void readDoubts(const JsonNode& root, CameraEstimate& estimate)
@@ -81,7 +99,7 @@ void writeCamera(const std::filesystem::path& path, const CameraEstimate& estima
     json["focal_px"] = toJson(camera.focal_px);
     json["focal_px_sigma"] = toJson(glm::dvec2(estimate.focal_sigma_px));
     json["principal_point_px"] = toJson(camera.principal_px);
-    json["distortion"] = Json::array();
+    json["distortion"] = distortionJson(camera);
     json["position_m"] = toJson(camera.position_m);
     json["position_m_sigma"] = toJson(estimate.position_sigma_m);
     json["right"] = toJson(camera.right);
@@ -129,7 +147,7 @@ CameraEstimate readCamera(const std::filesystem::path& path)
     camera.principal_px = glm::dvec2(camera.width, camera.height) * 0.5;
     if (const auto principal = root.find("principal_point_px"))
         camera.principal_px = principal->vec2();
-    readDistortion(root);
+    camera.division = readDistortion(root);
     camera.position_m = root.at("position_m").vec3();
     camera.right = root.at("right").vec3();
     camera.up = root.at("up").vec3();

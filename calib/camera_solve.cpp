@@ -344,8 +344,8 @@ CameraEstimate calibrateCamera(const LineSet& marked,
     estimate.residual_rms_px =
         std::sqrt(sum / static_cast<double>(orientation.distances_px.size()));
     estimate.vanishing_points_px = vanishingPoints(lines, estimate.camera, axes);
+    estimate.camera.division = marked.distortion.division;
     append(estimate.findings, std::move(place.findings));
-    append(estimate.findings, distortionFindings(marked));
     reportDoubts(lines, choice.solution, estimate);
     return estimate;
 }

@@ -33,7 +33,7 @@ struct CameraEstimate {
     glm::dvec3 position_sigma_m{0.0};
     double residual_rms_px = 0.0;  ///< segments' end points against their vanishing points
     std::array<std::optional<glm::dvec2>, 3>
-        vanishing_points_px;  ///< x, y, z; absent = infinity or unused
+        vanishing_points_px;  ///< x, y, z, where straight pixels meet; absent = infinity or unused
     Findings findings;
 };
 
@@ -55,7 +55,6 @@ struct CameraEstimate {
 ///                               worse than 5 % of the distance to the origin
 ///   axis-sign-ambiguous         x runs so nearly along the view that "right" is a matter of luck
 ///   scale-disagrees             see calib/metric_scale.h
-///   lens-distortion-approximated  see calib/lens_distortion.h
 /// Throws InputError for a broken LineSet, NoAnswerError (naming `source`) when the lines admit no
 /// camera: a single axis, too few segments, an open focal length without EXIF, lines of an axis
 /// that do not meet in a direction perpendicular to the others, y segments that run horizontally,
@@ -69,7 +68,7 @@ struct CameraEstimate {
 void writeCamera(const std::filesystem::path& path, const CameraEstimate& estimate);
 /// Reads `camera.json`, ours or another program's: image, focal_px, position_m, right, up and
 /// forward are needed, the rest has defaults. InputError when the axes are not orthonormal (1e-3)
-/// or left-handed, or a distortion is given, which is not modelled yet.
+/// or left-handed, or a distortion is given that is no division model.
 [[nodiscard]] CameraEstimate readCamera(const std::filesystem::path& path);
 
 }  // namespace insitu

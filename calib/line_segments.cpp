@@ -121,11 +121,6 @@ void LineSet::check(const std::string& source) const
     if (!std::isfinite(distortion.division) || std::abs(distortion.division) > kMaxDivision)
         throw InputError(
             source, "distortion.division", fmt::format("must lie within ±{}", kMaxDivision));
-    if (!(distortion.unchanged_radius_px >= 0.0) ||
-        distortion.unchanged_radius_px > 0.5 * std::hypot(width, height))
-        throw InputError(source,
-                         "distortion.unchanged_radius_px",
-                         "must lie between 0 and half the picture's diagonal");
     if (!(camera_height_sigma_m >= 0.0) || !std::isfinite(camera_height_sigma_m))
         throw InputError(source, "scale.camera_height_sigma_m", "must be >= 0 metres");
 }
@@ -150,10 +145,8 @@ LineSet readLineSet(const std::filesystem::path& path)
     lines.origin_px = root.at("origin_px").vec2();
     readScale(root, lines);
     if (const auto distortion = root.find("distortion")) {
-        distortion->expectKeys({"division", "unchanged_radius_px"});
+        distortion->expectKeys({"division"});
         lines.distortion.division = distortion->at("division").number();
-        if (const auto radius = distortion->find("unchanged_radius_px"))
-            lines.distortion.unchanged_radius_px = radius->number();
     }
     lines.check(path.string());
     return lines;

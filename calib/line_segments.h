@@ -37,10 +37,9 @@ struct KnownLength {
     double metres = 0.0;
 };
 
-/// How far the lens bends lines (calib/lens_distortion.h). The default bends nothing.
+/// How far the lens bends lines: λ of core/camera.h. The default bends nothing.
 struct MarkedDistortion {
-    double division = 0.0;             ///< λ for r in half diagonals; a barrel is negative
-    double unchanged_radius_px = 0.0;  ///< distance from the middle where the camera is exact
+    double division = 0.0;
 };
 
 /// What the user marked in the photograph.

@@ -2,21 +2,59 @@
 
 #include "core/check.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace insitu {
+
+namespace {
+
+/// Far outside any picture the model folds over; rays there stay in front of the camera.
+constexpr double kSmallestDivisor = 1e-3;
+
+/// |p|²/R² with R half the picture's diagonal.
+double relativeSquare(glm::dvec2 off, const Camera& camera)
+{
+    const double width = camera.width;
+    const double height = camera.height;
+    return 4.0 * glm::dot(off, off) / (width * width + height * height);
+}
+
+}  // namespace
+
+glm::dvec2 Camera::straightened(glm::dvec2 pixel) const
+{
+    if (division == 0.0) return pixel;
+    const glm::dvec2 off = pixel - principal_px;
+    const double divisor = 1.0 + division * relativeSquare(off, *this);
+    return principal_px + off / std::max(divisor, kSmallestDivisor);
+}
+
+// With s the straight and r the seen radius in half diagonals: λ s r² − r + s = 0. The root that
+// tends to s for small λ, in the form without cancellation: r = 2 s / (1 + √(1 − 4 λ s²)).
+std::optional<glm::dvec2> Camera::distorted(glm::dvec2 straight_px) const
+{
+    if (division == 0.0) return straight_px;
+    const glm::dvec2 off = straight_px - principal_px;
+    const double root = 1.0 - 4.0 * division * relativeSquare(off, *this);
+    if (!(root >= 0.0)) return std::nullopt;
+    return principal_px + off * (2.0 / (1.0 + std::sqrt(root)));
+}
 
 std::optional<glm::dvec2> Camera::project(glm::dvec3 x_in_world) const
 {
     const glm::dvec3 d = x_in_world - position_m;
     const double z = glm::dot(forward, d);
     if (!(z > 0.0)) return std::nullopt;
-    return glm::dvec2(focal_px.x * glm::dot(right, d) / z + principal_px.x,
-                      -focal_px.y * glm::dot(up, d) / z + principal_px.y);
+    return distorted(glm::dvec2(focal_px.x * glm::dot(right, d) / z + principal_px.x,
+                                -focal_px.y * glm::dot(up, d) / z + principal_px.y));
 }
 
 glm::dvec3 Camera::rayDirection(glm::dvec2 pixel) const
 {
-    const double x = (pixel.x - principal_px.x) / focal_px.x;
-    const double y = (pixel.y - principal_px.y) / focal_px.y;
+    const glm::dvec2 straight = straightened(pixel);
+    const double x = (straight.x - principal_px.x) / focal_px.x;
+    const double y = (straight.y - principal_px.y) / focal_px.y;
     return glm::normalize(right * x - up * y + forward);
 }
 

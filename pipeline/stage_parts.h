@@ -58,6 +58,7 @@ void parts(auto& archive, PartsOf<RenderedStage> auto& v)
 void parts(auto& archive, PartsOf<Camera> auto& v)
 {
     archive(v.width, v.height, v.focal_px, v.principal_px, v.position_m, v.right, v.up, v.forward);
+    archive(v.division);
 }
 void parts(auto& archive, PartsOf<ProxyFace> auto& v)
 {

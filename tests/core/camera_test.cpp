@@ -61,6 +61,7 @@ TEST(Camera, ProjectionAndRaysAreInverse)
         Camera camera = Camera::lookAt(position, target, between(200, 2000), 640, 480);
         camera.focal_px.y *= 1.1;
         camera.principal_px += glm::dvec2(between(-20, 20), between(-20, 20));
+        camera.division = i % 2 == 0 ? 0.0 : between(-0.3, 0.3);
         const glm::dvec2 pixel(between(0, 640), between(0, 480));
         const glm::dvec3 direction = camera.rayDirection(pixel);
         EXPECT_NEAR(glm::length(direction), 1.0, tolerance::kDouble);
@@ -69,6 +70,38 @@ TEST(Camera, ProjectionAndRaysAreInverse)
         EXPECT_NEAR(back->x, pixel.x, tolerance::kIterative);
         EXPECT_NEAR(back->y, pixel.y, tolerance::kIterative);
     }
+}
+
+// λ = −0.1 at 0.8 half diagonals (40 px of 50): straight radius 0.8 / (1 − 0.1 · 0.64) · 50.
+TEST(Camera, ABarrelLensShowsTheCornersNearer)
+{
+    Camera camera = Camera::lookAt({0, 1, 3}, {0, 1, 0}, 70.0, 80, 60);
+    camera.division = -0.1;
+    const glm::dvec2 straight = camera.straightened({40.0 + 40.0, 30.0});
+    EXPECT_NEAR(straight.x, 40.0 + 42.735042735042735, 43.0 * tolerance::kDouble);
+    EXPECT_EQ(straight.y, 30.0);
+    EXPECT_NEAR(camera.distorted(straight)->x, 80.0, 80.0 * tolerance::kDouble);
+    const glm::dvec3 ray = camera.rayDirection({80.0, 30.0});
+    EXPECT_NEAR(ray.x / -ray.z, 42.735042735042735 / 70.0, tolerance::kDouble);
+    EXPECT_NEAR(camera.project(camera.position_m + 2.0 * ray)->x, 80.0, 80.0 * tolerance::kDouble);
+}
+
+TEST(Camera, APincushionSeesNothingBeyondItsEdge)
+{
+    Camera camera = Camera::lookAt({0, 1, 3}, {0, 1, 0}, 70.0, 80, 60);
+    camera.division = 0.4;
+    // 4 λ s² = 1 at s = 0.79 half diagonals = 39.5 px.
+    EXPECT_TRUE(camera.distorted({40.0 + 39.5, 30.0}));
+    EXPECT_FALSE(camera.distorted({40.0 + 39.6, 30.0}));
+    EXPECT_FALSE(camera.project(camera.position_m + glm::dvec3(0.8, 0.0, -1.0)));
+}
+
+TEST(Camera, WithoutDistortionNothingIsTouched)
+{
+    const Camera camera = Camera::lookAt({0, 1, 3}, {0, 1, 0}, 70.0, 80, 60);
+    const glm::dvec2 pixel(79.1, 3.3);
+    EXPECT_EQ(camera.straightened(pixel), pixel);
+    EXPECT_EQ(*camera.distorted(pixel), pixel);
 }
 
 }  // namespace
