@@ -1,0 +1,56 @@
+#pragma once
+
+#include "lighting/silhouettes.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace insitu::fiv {
+
+/// Places that are summed together: neighbours in space, so that they fall into the same part of a
+/// silhouette. Everything is an array a coordinate, for the compiler's vectors.
+struct Block {
+    static constexpr int kSize = 32;
+    using Row = float[kSize];
+
+    alignas(64) Row x, y, z;     ///< local places; unused ones repeat the last
+    alignas(64) Row nx, ny, nz;  ///< normals, where they are asked for
+    alignas(64) Row sums[9];     ///< what comes out, channel by channel
+};
+/// Blocks that are summed together: their sums stay in the second cache, a silhouette in the first.
+struct Group {
+    static constexpr int kBlocks = 96;
+
+    Block blocks[kBlocks];
+    int count = 0;
+    /// Balls around the places of each block; all of them beyond `count` are as the last.
+    alignas(64) float x[kBlocks], y[kBlocks], z[kBlocks], radius[kBlocks];
+};
+
+/// What is summed of each direction's hidden light.
+enum class Sum {
+    Vectors,     ///< its irradiance vector: 9 sums, flux of 9 numbers a direction
+    Irradiance,  ///< irradiance of one common normal: 3 sums, flux of 3 numbers a direction
+    PerPlace,    ///< max(0, N·vector) with each place's own normal: 3 sums, flux of 9 numbers
+};
+[[nodiscard]] constexpr int fluxNumbers(Sum sum)
+{
+    return sum == Sum::Irradiance ? 3 : 9;
+}
+
+/// A set of silhouettes with the light of ω and −ω of each, `fluxNumbers` a direction.
+struct Source {
+    const SilhouetteSet* set = nullptr;
+    std::vector<float> along, against;
+    std::vector<std::uint8_t> shines;  ///< bit 0: along, bit 1: against
+};
+
+/// Instruction sets that the sums were compiled for. All give the same bytes.
+enum class Isa { Base, Avx2, Avx512 };
+[[nodiscard]] Isa bestIsa();
+
+/// Adds to the blocks' sums what the object hides from their places, direction by direction.
+void addHidden(Isa isa, Sum sum, const Source& source, float bias_texels, Group& group);
+
+}  // namespace insitu::fiv

@@ -1,0 +1,66 @@
+#pragma once
+
+#include "lighting/cell_light.h"
+#include "lighting/visibility_atlas.h"
+
+#include <glm/glm.hpp>
+
+#include <span>
+
+namespace insitu {
+
+/// An object under a light: its atlas, what comes from each direction, and silhouettes of its own
+/// for the directions of concentrated light. A new environment, a turned object or a changed lamp
+/// is a new ObjectLight of the same atlas.
+struct ObjectLight {
+    const VisibilityAtlas* atlas = nullptr;  ///< outlives this
+    CellLight light;
+    SilhouetteSet fine;  ///< one a fine direction
+
+    [[nodiscard]] const LocalFrame& local() const { return atlas->silhouettes.local; }
+};
+
+/// Silhouettes of concentrated light: its shadows have sharp edges.
+struct FineSilhouetteOptions {
+    /// Texels along a side, [16, 2048].
+    int resolution = 256;
+    /// Samples along a texel's side, [1, 8].
+    int samples = 2;
+
+    [[nodiscard]] Findings validate() const;
+};
+
+/// `mesh` is what the atlas was made from (LogicError when light and atlas do not belong together).
+[[nodiscard]] ObjectLight lightObject(const TriangleMesh& mesh,
+                                      const VisibilityAtlas& atlas,
+                                      CellLight light,
+                                      const FineSilhouetteOptions& options,
+                                      Progress& progress);
+
+/// What an object hides from places, exactly up to the silhouettes' texels: no field in between.
+///
+/// Common rules: places and normals are in the object's axes, places local (LocalFrame). Neighbours
+/// in a span should be neighbours in space: runs of 32 places are summed together, and cost less
+/// the smaller the ball around them. `bias_texels` as in hiddenShares(). Sums run in float in a
+/// fixed order: the same bytes for any number of threads and any processor. Non-finite places are
+/// a LogicError.
+
+/// FIV of the hidden light.
+void hiddenVectors(const ObjectLight& object,
+                   std::span<const glm::vec3> places_local,
+                   std::span<IrradianceVector> hidden,
+                   float bias_texels = 0.0f);
+/// Irradiance of the hidden light that lies above the horizon of each place's own unit normal.
+void hiddenIrradiance(const ObjectLight& object,
+                      std::span<const glm::vec3> places_local,
+                      std::span<const glm::vec3> unit_normals,
+                      std::span<Rgb> hidden,
+                      float bias_texels = 0.0f);
+/// The same for one common normal: a floor, a wall, a table top. Three times as quick.
+void hiddenIrradiance(const ObjectLight& object,
+                      std::span<const glm::vec3> places_local,
+                      glm::vec3 unit_normal,
+                      std::span<Rgb> hidden,
+                      float bias_texels = 0.0f);
+
+}  // namespace insitu

@@ -1,0 +1,454 @@
+#include "lighting/hidden_light.h"
+
+#include "core/parallel.h"
+#include "core/random.h"
+#include "lighting/fiv_kernel.h"
+#include "reconstruct/ray_scene.h"
+#include "tests/lighting/furniture_shapes.h"
+#include "tests/support/errors.h"
+#include "tests/support/tolerance.h"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <limits>
+#include <numbers>
+
+namespace insitu {
+namespace {
+
+using std::numbers::pi;
+using testing::HasSubstr;
+
+Progress silent;
+const AtlasOptions kSmall{.face_size = 16, .resolution = 64, .samples = 2};
+
+EnvironmentMap constant(float radiance)
+{
+    return {Image<Rgb>(64, 32, Rgb(radiance))};
+}
+
+/// Dim sky with a lamp and, opposite, a red window.
+EnvironmentMap lamps()
+{
+    EnvironmentMap map{Image<Rgb>(128, 64, Rgb(0.2f, 0.25f, 0.3f))};
+    for (int y = 10; y < 13; ++y)
+        for (int x = 30; x < 34; ++x)
+            map.pixels(x, y) = Rgb(40.0f);
+    for (int y = 16; y < 28; ++y)
+        for (int x = 90; x < 104; ++x)
+            map.pixels(x, y) = Rgb(4.0f, 1.0f, 0.5f);
+    return map;
+}
+
+ObjectLight lit(const TriangleMesh& mesh,
+                const VisibilityAtlas& atlas,
+                const EnvironmentMap& map,
+                const LightSplitOptions& options = {},
+                const glm::dmat3& object_from_world = glm::dmat3(1.0))
+{
+    return lightObject(
+        mesh, atlas, splitLight(map, object_from_world, atlas.cells(), options), {}, silent);
+}
+
+std::vector<glm::vec3> placesAround(double radii, std::size_t count)
+{
+    std::vector<glm::vec3> places(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        RandomStream random(5, 0, i);
+        const glm::dvec3 d(random.normal(), random.normal(), random.normal());
+        places[i] = glm::vec3(glm::normalize(d) * radii);
+    }
+    return places;
+}
+
+std::vector<IrradianceVector> hiddenAt(const ObjectLight& object,
+                                       const std::vector<glm::vec3>& places)
+{
+    std::vector<IrradianceVector> hidden(places.size());
+    hiddenVectors(object, places, hidden);
+    return hidden;
+}
+
+/// Largest component of all channels.
+double sizeOf(const IrradianceVector& v)
+{
+    double most = 0.0;
+    for (const glm::vec3& channel : v.channels)
+        for (int axis = 0; axis < 3; ++axis)
+            most = std::max<double>(most, std::abs(channel[axis]));
+    return most;
+}
+
+double distance(IrradianceVector a, const IrradianceVector& b)
+{
+    return sizeOf(a -= b);
+}
+
+TEST(CellLight, VectorOfAHemisphereIsPi)
+{
+    EnvironmentMap sky = constant(0.0f);
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 64; ++x)
+            sky.pixels(x, y) = Rgb(1.0f, 2.0f, 0.5f);
+    for (const int most : {0, 48}) {
+        const IrradianceVector total =
+            splitLight(sky, glm::dmat3(1.0), {32}, {.max_fine_directions = most}).total();
+        // ∫ ω dω over the upper hemisphere: (0, π, 0), by the midpoint rule in elevation.
+        EXPECT_NEAR(total.channels[0].y / pi, 1.0, 3e-4);
+        EXPECT_NEAR(total.channels[1].y / pi, 2.0, 6e-4);
+        EXPECT_NEAR(total.channels[2].y / pi, 0.5, 2e-4);
+        EXPECT_NEAR(total.channels[0].x, 0.0, tolerance::kFloat);
+        EXPECT_NEAR(total.channels[0].z, 0.0, tolerance::kFloat);
+    }
+    EXPECT_LT(sizeOf(splitLight(constant(1.0f), glm::dmat3(1.0), {32}).total()), 1e-4);
+}
+
+TEST(CellLight, ASunGetsDirectionsOfItsOwn)
+{
+    EnvironmentMap map = constant(0.1f);
+    map.pixels(20, 5) = map.pixels(21, 5) = Rgb(5000.0f);
+    const CellLight light = splitLight(map, glm::dmat3(1.0), {32});
+    const CellLight blunt = splitLight(map, glm::dmat3(1.0), {32}, {.max_fine_directions = 0});
+    ASSERT_GE(light.fine.size(), 8u);
+    EXPECT_TRUE(blunt.fine.empty());
+    IrradianceVector sun;
+    for (std::size_t i = 0; i < light.fine.size(); ++i) {
+        sun += light.fine[i];
+        const glm::dvec2 uv = environmentUvFromDirection(light.fine_directions[i]);
+        EXPECT_NEAR(uv.x * 64.0, 21.0, 1.0 + 1e-6);
+        EXPECT_NEAR(uv.y * 32.0, 5.5, 0.5 + 1e-6);
+    }
+    const double solid_angle = environmentTexelSolidAngle(64, 32, 5);
+    // Both texels; their light's vector is a little shorter than its sum.
+    EXPECT_NEAR(glm::length(sun.channels[0]) / (2.0 * 5000.0 * solid_angle), 1.0, 0.002);
+    EXPECT_LT(distance(light.total(), blunt.total()), 1e-3 * sizeOf(light.total()));
+    EXPECT_LT(light.spread_rad, 0.6 * blunt.spread_rad);
+}
+
+TEST(CellLight, BlackAndEmptyMapsGiveNothing)
+{
+    for (const EnvironmentMap& map : {constant(0.0f), EnvironmentMap{}}) {
+        const CellLight light = splitLight(map, glm::dmat3(1.0), {8});
+        EXPECT_EQ(sizeOf(light.total()), 0.0);
+        EXPECT_TRUE(light.fine.empty());
+        EXPECT_EQ(light.spread_rad, 0.0);
+        const TriangleMesh mesh = shapes::chair();
+        const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {8, 32, 1}, silent);
+        const ObjectLight object = lit(mesh, atlas, map);
+        for (const IrradianceVector& v : hiddenAt(object, placesAround(1.2, 40)))
+            EXPECT_EQ(sizeOf(v), 0.0);
+    }
+}
+
+TEST(CellLight, RefusesWhatIsNoLight)
+{
+    const auto errorOf = [](float value) {
+        EnvironmentMap map = constant(1.0f);
+        map.pixels(3, 7).g = value;
+        return inputErrorOf([&] { (void)splitLight(map, glm::dmat3(1.0), {8}); });
+    };
+    EXPECT_THAT(errorOf(std::numeric_limits<float>::quiet_NaN()), HasSubstr("(3, 7)"));
+    EXPECT_THAT(errorOf(std::numeric_limits<float>::infinity()), HasSubstr("(3, 7)"));
+    EXPECT_THAT(errorOf(-1.0f), HasSubstr("(3, 7)"));
+    EXPECT_THAT(inputErrorOf([] {
+                    (void)splitLight(constant(1.0f), glm::dmat3(1.0), {8}, {-1, -1.0});
+                }),
+                testing::AllOf(HasSubstr("max_fine_directions"), HasSubstr("spread_tolerance")));
+    const TriangleMesh mesh = shapes::chair();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {4, 32, 1}, silent);
+    const CellLight light = splitLight(lamps(), glm::dmat3(1.0), {4});
+    EXPECT_THAT(inputErrorOf([&] {
+                    (void)lightObject(mesh, atlas, light, {8, 9}, silent);
+                }),
+                testing::AllOf(HasSubstr("resolution is 8"), HasSubstr("samples is 9")));
+    const CellLight other = splitLight(lamps(), glm::dmat3(1.0), {8});
+    EXPECT_THROW((void)lightObject(mesh, atlas, other, {}, silent), LogicError);
+}
+
+TEST(HiddenLight, BallUnderConstantLightIsItsFormFactor)
+{
+    const TriangleMesh ball = shapes::sphere({0, 0, 0}, 1.0f, 32);
+    const VisibilityAtlas atlas = buildVisibilityAtlas(ball, {32, 32, 2}, silent);
+    const ObjectLight object = lit(ball, atlas, constant(1.0f));
+    for (const double radii : {1.2, 1.5, 2.5}) {
+        const std::vector<glm::vec3> places = placesAround(radii, 200);
+        const std::vector<IrradianceVector> hidden = hiddenAt(object, places);
+        double square = 0.0;
+        for (std::size_t i = 0; i < places.size(); ++i) {
+            // FIV of a disc of uniform radiance: π sin² of its half angle, towards its middle.
+            const glm::vec3 expected = -glm::normalize(places[i]) * static_cast<float>(pi) /
+                                       static_cast<float>(radii * radii);
+            const double off = glm::length(hidden[i].channels[0] - expected);
+            square += off * off * radii * radii * radii * radii / (pi * pi);
+        }
+        // The cells on the cone's edge count by their middle: n of them, each wrong at random.
+        EXPECT_LT(std::sqrt(square / 200.0), radii < 2.0 ? 0.01 : 0.02) << radii;
+    }
+}
+
+TEST(HiddenLight, SumsAreThoseOfTheDefinition)
+{
+    const TriangleMesh mesh = shapes::table();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, kSmall, silent);
+    const ObjectLight object = lit(mesh, atlas, lamps());
+    ASSERT_FALSE(object.light.fine.empty());
+    std::vector<glm::vec3> places;
+    for (const double radii : {0.3, 0.8, 1.1, 3.0})
+        for (const glm::vec3& p : placesAround(radii, 25))
+            places.push_back(p);
+    const float bias = 0.25f;
+    std::vector<IrradianceVector> hidden(places.size());
+    hiddenVectors(object, places, hidden, bias);
+    const double total = 10.0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        std::array<glm::dvec3, 3> sum{glm::dvec3(0.0), glm::dvec3(0.0), glm::dvec3(0.0)};
+        const auto add = [&](const IrradianceVector& light, double share) {
+            for (std::size_t c = 0; c < 3; ++c)
+                sum[c] += glm::dvec3(light.channels[c]) * share;
+        };
+        for (std::size_t k = 0; k < atlas.cells().pairCount(); ++k) {
+            const HiddenShares shares = hiddenShares(atlas.silhouettes, k, places[i], bias);
+            add(object.light.along[k], shares.along);
+            add(object.light.against[k], shares.against);
+        }
+        for (std::size_t k = 0; k < object.light.fine.size(); ++k)
+            add(object.light.fine[k], hiddenShares(object.fine, k, places[i], bias).along);
+        // The stated error of summing in float: 1e-6 of all light, over thousands of directions.
+        for (std::size_t c = 0; c < 3; ++c)
+            for (int axis = 0; axis < 3; ++axis)
+                EXPECT_NEAR(hidden[i].channels[c][axis], sum[c][axis], 2e-6 * total) << i;
+    }
+}
+
+TEST(HiddenLight, HorizonIsThatOfTheNormal)
+{
+    const TriangleMesh mesh = shapes::chair();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, kSmall, silent);
+    const ObjectLight object = lit(mesh, atlas, lamps());
+    const std::vector<glm::vec3> places = placesAround(0.9, 100);
+    const glm::vec3 normal = glm::normalize(glm::vec3(0.2f, 1.0f, -0.3f));
+    std::vector<Rgb> common(places.size());
+    std::vector<Rgb> own(places.size());
+    hiddenIrradiance(object, places, normal, common);
+    hiddenIrradiance(object, places, std::vector<glm::vec3>(places.size(), normal), own);
+    const std::vector<IrradianceVector> vectors = hiddenAt(object, places);
+    int clipped = 0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        EXPECT_EQ(common[i], own[i]);
+        // Light below the horizon counts against N·FIV, never against the clipped sum.
+        const Rgb whole = vectors[i].along(normal);
+        EXPECT_GE(common[i].g, whole.g - 1e-5f);
+        clipped += common[i].g > whole.g + 1e-3f ? 1 : 0;
+    }
+    EXPECT_GT(clipped, 20);
+}
+
+TEST(HiddenLight, EveryInstructionSetAndThreadCountGivesTheSameBytes)
+{
+    const TriangleMesh mesh = shapes::table();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {8, 32, 2}, silent);
+    const ObjectLight object = lit(mesh, atlas, lamps());
+    std::vector<glm::vec3> places = placesAround(0.5, 3000);
+    for (const glm::vec3& p : placesAround(1.3, 4000))
+        places.push_back(p);
+    const auto same = [](const auto& a, const auto& b) {
+        return std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
+    };
+    const std::vector<IrradianceVector> many = hiddenAt(object, places);
+    setThreadCount(1);
+    EXPECT_TRUE(same(hiddenAt(object, places), many));
+    setThreadCount(0);
+
+    fiv::Source source;
+    source.set = &atlas.silhouettes;
+    for (const IrradianceVector& light : object.light.along)
+        for (const glm::vec3& channel : light.channels)
+            for (int axis = 0; axis < 3; ++axis)
+                source.along.push_back(channel[axis]);
+    source.against = source.along;
+    source.shines.assign(object.light.along.size(), 3);
+    const auto sums = [&](fiv::Isa isa) {
+        const auto group = std::make_unique<fiv::Group>();
+        std::memset(static_cast<void*>(group.get()), 0, sizeof(*group));
+        group->count = fiv::Group::kBlocks;
+        for (std::size_t b = 0; b < fiv::Group::kBlocks; ++b) {
+            group->radius[b] = 10.0f;
+            for (std::size_t i = 0; i < fiv::Block::kSize; ++i) {
+                const glm::vec3 p = places[b * fiv::Block::kSize + i];
+                group->blocks[b].x[i] = p.x;
+                group->blocks[b].y[i] = p.y;
+                group->blocks[b].z[i] = p.z;
+            }
+        }
+        fiv::addHidden(isa, fiv::Sum::Vectors, source, 0.0f, *group);
+        std::vector<float> all;
+        for (const fiv::Block& block : group->blocks)
+            for (const auto& row : block.sums)
+                all.insert(all.end(), std::begin(row), std::end(row));
+        return all;
+    };
+    const std::vector<float> base = sums(fiv::Isa::Base);
+    EXPECT_NE(*std::ranges::max_element(base), 0.0f);
+    for (int isa = 1; isa <= static_cast<int>(fiv::bestIsa()); ++isa)
+        EXPECT_TRUE(same(sums(static_cast<fiv::Isa>(isa)), base)) << isa;
+}
+
+TEST(HiddenLight, IsLinearInTheLight)
+{
+    const TriangleMesh mesh = shapes::chair();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, kSmall, silent);
+    EnvironmentMap one = constant(0.0f);
+    EnvironmentMap other = constant(0.0f);
+    EnvironmentMap both = constant(0.0f);
+    for (std::size_t i = 0; i < one.pixels.pixels().size(); ++i) {
+        RandomStream random(2, i, 0);
+        one.pixels.pixels()[i] = Rgb(random.uniform(), random.uniform(), random.uniform());
+        other.pixels.pixels()[i] = Rgb(random.uniform(), 0.0f, random.uniform());
+        both.pixels.pixels()[i] = one.pixels.pixels()[i] + 4.0f * other.pixels.pixels()[i];
+    }
+    const LightSplitOptions plain{.max_fine_directions = 0};
+    const std::vector<glm::vec3> places = placesAround(0.7, 64);
+    const auto a = hiddenAt(lit(mesh, atlas, one, plain), places);
+    const auto b = hiddenAt(lit(mesh, atlas, other, plain), places);
+    const auto c = hiddenAt(lit(mesh, atlas, both, plain), places);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        IrradianceVector sum = b[i];
+        sum *= 4.0f;
+        sum += a[i];
+        EXPECT_LT(distance(sum, c[i]), tolerance::kFloat * 10.0) << "4 + 1 units of light";
+    }
+}
+
+TEST(HiddenLight, TurningTheObjectIsTurningTheLightBack)
+{
+    const TriangleMesh mesh = shapes::table();
+    const double angle = 0.6;
+    // world_from_object, columns.
+    const glm::dmat3 turn(
+        std::cos(angle), 0, -std::sin(angle), 0, 1, 0, std::sin(angle), 0, std::cos(angle));
+    TriangleMesh turned = mesh;
+    for (glm::vec3& p : turned.positions)
+        p = glm::vec3(turn * glm::dvec3(p));
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {24, 64, 2}, silent);
+    const VisibilityAtlas turned_atlas = buildVisibilityAtlas(turned, {24, 64, 2}, silent);
+    const ObjectLight by_light = lit(mesh, atlas, lamps(), {}, glm::transpose(turn));
+    const ObjectLight by_mesh = lit(turned, turned_atlas, lamps());
+    std::vector<glm::vec3> floor;
+    std::vector<glm::vec3> floor_in_object;
+    std::vector<glm::vec3> floor_in_turned;
+    for (int i = 0; i < 400; ++i) {
+        const glm::dvec3 x(-1.0 + 0.1 * (i % 20), -0.001, -1.0 + 0.1 * (i / 20));
+        floor_in_turned.push_back(by_mesh.local().localFrom(x));
+        floor_in_object.push_back(by_light.local().localFrom(glm::transpose(turn) * x));
+    }
+    std::vector<Rgb> a(floor_in_object.size());
+    std::vector<Rgb> b(floor_in_turned.size());
+    hiddenIrradiance(by_light, floor_in_object, glm::vec3(0, 1, 0), a);
+    hiddenIrradiance(by_mesh, floor_in_turned, glm::vec3(0, 1, 0), b);
+    double square = 0.0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        square += (a[i].g - b[i].g) * (a[i].g - b[i].g) / static_cast<double>(a.size());
+        most = std::max<double>(most, b[i].g);
+    }
+    // Other directions and other texels: as far apart as each is from the truth.
+    EXPECT_LT(std::sqrt(square), 0.015 * most);
+}
+
+TEST(HiddenLight, InsideAClosedBoxEverythingIsHidden)
+{
+    const TriangleMesh box = shapes::box(glm::vec3(-1.0f), glm::vec3(1.0f));
+    const VisibilityAtlas atlas = buildVisibilityAtlas(box, kSmall, silent);
+    const ObjectLight object = lit(box, atlas, lamps());
+    const IrradianceVector total = object.light.total();
+    for (const IrradianceVector& v : hiddenAt(object, placesAround(0.3, 33)))
+        EXPECT_LT(distance(v, total), 1e-5 * sizeOf(total));
+    for (const IrradianceVector& v : hiddenAt(object, placesAround(100.0, 33)))
+        EXPECT_LT(sizeOf(v), 1e-2 * sizeOf(total)) << "far away hardly anything";
+}
+
+TEST(HiddenLight, ASunCastsADarkShadowWithASharpEdge)
+{
+    // One texel of 1e5 in a black sky, 45 degrees up over -z, one degree wide.
+    EnvironmentMap map{Image<Rgb>(360, 180, Rgb(0.0f))};
+    map.pixels(180, 44) = Rgb(1e5f);
+    const TriangleMesh board = shapes::box({-1.0f, 1.0f, -1.0f}, {1.0f, 1.02f, 1.0f});
+    const VisibilityAtlas atlas = buildVisibilityAtlas(board, kSmall, silent);
+    const ObjectLight object = lit(board, atlas, map);
+    const glm::vec3 up(0, 1, 0);
+    const Rgb sun = object.light.total().along(up);
+    std::vector<glm::vec3> line;
+    for (int i = 0; i <= 400; ++i)
+        line.push_back(object.local().localFrom({0.0, 0.0, -1.0 + 0.01 * i}));
+    std::vector<Rgb> hidden(line.size());
+    hiddenIrradiance(object, line, up, hidden);
+    // The board's shadow lies on z = 0 (its front edge, seen 45 degrees up) to 2 + its thickness.
+    for (int i = 0; i <= 400; ++i) {
+        const double z = -1.0 + 0.01 * i;
+        const double share = hidden[static_cast<std::size_t>(i)].g / sun.g;
+        if (z < -0.07 || z > 2.09) {
+            EXPECT_NEAR(share, 0.0, 1e-4) << z;
+        }
+        if (z > 0.07 && z < 1.93) {
+            EXPECT_NEAR(share, 1.0, 1e-4) << z;
+        }
+    }
+    // Half a sun at its edge.
+    const auto at = std::ranges::find_if(hidden, [&](Rgb h) { return h.g > 0.5f * sun.g; });
+    EXPECT_NEAR(-1.0 + 0.01 * static_cast<double>(at - hidden.begin()), 0.0, 0.03);
+}
+
+TEST(HiddenLight, FloorUnderATableEqualsRaysOfTheSameDirections)
+{
+    const TriangleMesh mesh = shapes::table();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {16, 64, 2}, silent);
+    EnvironmentMap window = lamps();
+    for (Rgb& texel : window.pixels.pixels())
+        texel = glm::min(texel, Rgb(4.0f));
+    const ObjectLight object = lit(mesh, atlas, window, {.max_fine_directions = 0});
+    const TriangleMesh* const pointer = &mesh;
+    const RayScene rays(std::span<const TriangleMesh* const>(&pointer, 1));
+    const glm::vec3 up(0, 1, 0);
+    std::vector<glm::vec3> places;
+    std::vector<double> truth;
+    for (int i = 0; i < 600; ++i) {
+        const glm::dvec3 x(-1.2 + 0.08 * (i % 30), -1e-4, -1.0 + 0.1 * (i / 30));
+        places.push_back(object.local().localFrom(x));
+        double hidden = 0.0;
+        for (std::size_t k = 0; k < atlas.cells().pairCount(); ++k)
+            for (const double sign : {1.0, -1.0}) {
+                const IrradianceVector& light =
+                    (sign > 0.0 ? object.light.along : object.light.against)[k];
+                const double irradiance = light.along(up).g;
+                if (irradiance > 0.0 && rays.occluded(x, sign * atlas.cells().direction(k)))
+                    hidden += irradiance;
+            }
+        truth.push_back(hidden);
+    }
+    std::vector<Rgb> hidden(places.size());
+    hiddenIrradiance(object, places, up, hidden);
+    double square = 0.0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        square += (hidden[i].g - truth[i]) * (hidden[i].g - truth[i]) / 600.0;
+        most = std::max(most, truth[i]);
+    }
+    // A window of 20 cells throws 20 hard shadows in the truth, here blurred by a texel (2 cm).
+    EXPECT_LT(std::sqrt(square), 0.02 * most);
+}
+
+TEST(HiddenLight, RefusesPlacesThatAreNone)
+{
+    const TriangleMesh mesh = shapes::chair();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {4, 32, 1}, silent);
+    const ObjectLight object = lit(mesh, atlas, lamps());
+    std::vector<glm::vec3> places(5, glm::vec3(1.0f));
+    std::vector<Rgb> hidden(5);
+    places[3].y = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_THROW(hiddenIrradiance(object, places, glm::vec3(0, 1, 0), hidden), LogicError);
+    hiddenIrradiance(object, {}, glm::vec3(0, 1, 0), {});
+}
+
+}  // namespace
+}  // namespace insitu
