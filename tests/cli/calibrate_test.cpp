@@ -77,5 +77,35 @@ TEST_F(CalibrateSample, BadLinesEndWithTheirPlaceAndCause)
     EXPECT_FALSE(fs::exists(camera()));
 }
 
+TEST_F(CalibrateSample, FindsTheRoomByItself)
+{
+    const auto automatic = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> all = {
+            "calibrate", (kSample / "plate.jpg").string(), "-o", camera().string()};
+        all.insert(all.end(), more.begin(), more.end());
+        return runProgram(all);
+    };
+    const ProgramRun run =
+        automatic({"--auto", "--camera-height", "1.55", "--origin", "640", "800"});
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    EXPECT_THAT(run.messages, HasSubstr("automatic-lines"));
+    EXPECT_THAT(run.messages, ::testing::Not(HasSubstr("-assumed]: the world")));
+    const Json found = readJsonFile(camera());
+    const Json truth = readJsonFile(kSample / "truth" / "truth.json");
+    EXPECT_NEAR(found["focal_px"][0].get<double>() / truth["camera"]["fx_px"].get<double>(),
+                1.0,
+                0.01);  // docs/validation.md, automatic calibration
+    EXPECT_NEAR(found["position_m"][1].get<double>(), 1.55, 1e-9);
+
+    const ProgramRun both =
+        automatic({"--auto", "--lines", (kSample / "lines.json").string(), "--force"});
+    ASSERT_EQ(both.exit_code, 0) << both.messages;
+    EXPECT_THAT(both.messages, HasSubstr("lines-completed"));
+
+    EXPECT_EQ(automatic({"--force"}).exit_code, 2);
+    EXPECT_EQ(automatic({"--origin", "1", "2", "--force"}).exit_code, 2);
+    EXPECT_EQ(automatic({"--auto", "--camera-height", "-1", "--force"}).exit_code, 2);
+}
+
 }  // namespace
 }  // namespace insitu
