@@ -1,10 +1,13 @@
 // How exactly a mirror ball's picture becomes an environment, on balls traced ray by ray: for many
 // sizes, distances and places in the picture, the error of directions and of irradiance; for noise
-// and clutter, the error of the outline that is found.
+// and clutter, the error of the outline that is found. With folders of truth rooms: the outline's
+// error in their brackets instead.
 
 #include "capture/ball_outline.h"
 #include "capture/light_probe.h"
+#include "capture/radiance_capture.h"
 #include "core/check.h"
+#include "core/io/json.h"
 #include "core/random.h"
 #include "tests/capture/synthetic_ball.h"
 
@@ -15,6 +18,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <numbers>
 #include <vector>
 
@@ -189,11 +193,42 @@ void printOutline(
                result.findings.empty() ? "" : result.findings[0].code);
 }
 
+/// The ball of a truth room, whose project gives its outline exactly.
+void printRoom(const std::filesystem::path& folder)
+{
+    const Json project = readJson(folder / "project.json");
+    const Json& probe = project.at("light").at("probe");
+    std::vector<std::filesystem::path> images;
+    for (const Json& image : probe.at("images"))
+        images.push_back(folder / image.get<std::string>());
+    const Json& ball = probe.at("ball");
+    const glm::dvec2 center(ball.at("center_px").at(0).get<double>(),
+                            ball.at("center_px").at(1).get<double>());
+    const Image<Rgb> radiance = captureRadiance(readBracket(images), {}, {}).merged.radiance.pixels;
+    const BallOutlineResult result = findBallOutline(radiance);
+    if (!result.outline) {
+        fmt::print("{}: not found\n", folder.filename().string());
+        return;
+    }
+    fmt::print(
+        "{}: centre {:.3f} px off (sigma {:.3f}), radius {:+.3f} px ({:.3f}), share {:.2f} {}\n",
+        folder.filename().string(),
+        glm::length(result.outline->center_px - center),
+        result.outline->center_sigma,
+        result.outline->radius_px - ball.at("radius_px").get<double>(),
+        result.outline->radius_sigma,
+        result.outline->inlier_share,
+        result.findings.empty() ? "" : result.findings[0].code);
+}
+
 }  // namespace
 
-int main()
+int main(int argc, char** argv)
 {
     try {
+        for (int i = 1; i < argc; ++i)
+            printRoom(argv[i]);
+        if (argc > 1) return 0;
         fmt::print(
             "radius distance off-axis | direction error, degrees     | irradiance\n"
             "    px    radii  degrees |   median      95%      99%   | worst %\n");

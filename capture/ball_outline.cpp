@@ -59,8 +59,11 @@ BallOutlineResult findIn(const OutlinePicture& picture, const BallOutlineOptions
         result.outline = detail::withShares(picture, *options.start);
     } else if (options.start) {
         const detail::Outline start = detail::outlineOf(*options.start);
-        result.outline = detail::refineOutline(
+        result.outline = detail::approachOutline(
             picture, start, std::max(kStartReach * start.radius, 3.0), options.ellipse);
+        if (result.outline)
+            result.outline = detail::refineOutline(
+                picture, *result.outline, options.ellipse && start.stretch == glm::dvec2(0.0));
     } else {
         result.outline = detail::searchPicture(picture, options);
     }

@@ -21,14 +21,16 @@ struct BallOutline {
     double center_sigma = 0.0;  ///< standard deviation of the centre, the worse axis. Pixels
     double radius_sigma = 0.0;  ///< standard deviation of the radius. Pixels
     /// Of the directions in which the outline lies inside the picture, the share that shows the rim
-    /// there, above what chance would give. [0, 1]; plain walls behind the ball make it small.
+    /// there, above what chance would give. [0, 1]
     double inlier_share = 0.0;
     double visible_share = 1.0;  ///< of the outline, inside the picture. [0, 1]
 };
 
 /// How the outline is looked for.
 struct BallOutlineOptions {
-    /// A ball away from the camera's axis is seen as an ellipse. Off: a circle is fitted.
+    /// A ball away from the camera's axis is seen as an ellipse. Off: a circle is fitted. An
+    /// ellipse to start from keeps its shape, which a camera gives better than the picture
+    /// (predictBallOutline).
     bool ellipse = false;
     /// Where to begin, right within a tenth of the radius. Absent: the whole picture is searched.
     std::optional<BallOutline> start;
@@ -56,12 +58,12 @@ struct BallOutlineResult {
 /// 2. Each candidate is judged by edges along radial scans, joined by RANSAC [FisBol81]: of the
 ///    edges of many rays a circle takes those that lie on it, so reflections inside, clutter
 ///    outside, a stand or a hand do not count.
-/// 3. At full resolution each ray's place is the one where a model of a mirror's rim fits best:
-///    towards the rim the reflection turns into the background like the square root of the distance
-///    (2 sqrt(2 (1 - r/R)) from straight on), so that a plain gradient would sit inside it.
-/// 4. Robust least squares that lets places inside count less, for what is mirrored along the rim
-///    lies there, and never outside; with the standard deviation from the scatter of sectors of 10
-///    degrees and half the difference to a fit that counts both sides alike.
+/// 3. At full resolution the likeliest circle of all rays together: along a ray values wander with
+///    the background's roughness outside, and inside with the angle by which the mirror turns the
+///    ray, 2 sqrt(2 (1 - r/R)) from straight on, which shows the rim even of a perfect mirror
+///    before a plain wall, and does not take the edge of the floor beside the rim for it.
+/// 4. Its standard deviation is that of the answers that other draws of the outline's sectors of 10
+///    degrees give, so that it holds second answers almost as likely, and 0.15 px for the model.
 ///
 /// Radiance is looked at through its logarithm, a bracket in the codes of all its frames, all
 /// channels. Centres outside the picture and balls below 12 pixels of radius are not looked for.

@@ -1,9 +1,12 @@
 #include "capture/outline_refine.h"
 
-#include "capture/outline_rim.h"
+#include "capture/outline_joint.h"
+#include "capture/rim_likelihood.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace insitu::detail {
@@ -17,18 +20,6 @@ constexpr int kMostRays = 480;
 /// An ellipse of axes 1.1 : 1 leaves its circle by 4.5 % of the radius, and its first fit needs
 /// room.
 constexpr double kEllipseBand = 0.045;
-constexpr double kEllipseTolerance = 0.02;
-/// Rays are searched so many tolerances to both sides.
-constexpr double kReachTolerances = 4.0;
-/// What is mirrored beside the rim shows inside it, never outside: places inside count only within
-/// this share of the tolerance.
-constexpr double kInsideShare = 0.4;
-/// The tolerance shrinks to this, pixels, as long as this share of the inliers stays.
-constexpr double kFinestTolerance = 0.4;
-constexpr double kKeptShare = 0.5;
-/// The outer edge is taken when at least this share of the rays that spoke for the fit before it
-/// still does.
-constexpr double kOuterEdgeShare = 0.72;
 
 /// Of the outline, the share inside the picture.
 double visibleShare(const OutlinePicture& picture, const Outline& outline)
@@ -39,22 +30,6 @@ double visibleShare(const OutlinePicture& picture, const Outline& outline)
         inside += picture.contains(outline.center + radius * rayDirection(i, kMostRays));
     }
     return static_cast<double>(inside) / kMostRays;
-}
-
-/// Places on a real ball's outline scatter about so far: it is not quite round, nor the lens quite
-/// straight. Pixels.
-double toleranceFor(double radius)
-{
-    return std::clamp(0.006 * radius, 0.6, 4.0);
-}
-
-/// Of the visible rays, the share that shows the rim at the outline rather than somewhere else. A
-/// ray without a rim has its best place anywhere within reach, by chance within the tolerance.
-double shareOfRim(int inliers, int rays, double visible)
-{
-    const double share = std::min(inliers / std::max(visible * rays, 1.0), 1.0);
-    const double chance = 1.0 / kReachTolerances;
-    return std::max((share - chance) / (1.0 - chance), 0.0);
 }
 
 /// The consensus of an ellipse of the given shape: that of a circle where the ellipse is made one.
@@ -117,43 +92,34 @@ std::optional<OutlineFit> searchNear(
     return fitOutline(edges, wide->outline, true, {fine, fine});
 }
 
-BallOutline withShares(const OutlinePicture& picture, BallOutline ball)
-{
-    const Outline outline = outlineOf(ball);
-    const int rays = outlineRays(ball.radius_px);
-    const double tolerance = toleranceFor(ball.radius_px);
-    const double reach = kReachTolerances * tolerance;
-    int inliers = 0;
-    for (const RimRay& ray : locateRim(picture, outline, rays, reach)) {
-        for (const RimPoint& point : ray) {
-            const glm::dvec2 arm = point.place - outline.center;
-            const double off = glm::length(arm) - outline.radiusAt(std::atan2(arm.y, arm.x));
-            inliers += std::abs(off) < tolerance;
-        }
-    }
-    ball.visible_share = visibleShare(picture, outline);
-    ball.inlier_share = shareOfRim(inliers, rays, ball.visible_share);
-    return ball;
-}
-
 namespace {
 
-/// A fit to the places of the rim; `inside_share` of the tolerance counts inside the curve.
-std::optional<OutlineFit> fitRim(const OutlinePicture& picture,
-                                 const Outline& near,
-                                 bool ellipse,
-                                 double tolerance,
-                                 double inside_share)
+/// What the rim's likelihood looks at in the end, pixels, and first, as a share of the radius.
+constexpr double kLastReach = 3.0;
+constexpr double kFirstReach = 0.04;
+constexpr double kReachStep = 0.25;
+/// Standard deviations of blur tried: pixel and bilinear look-up alone, up to out of focus.
+constexpr std::array<double, 4> kBlurs = {0.5, 0.8, 1.3, 2.1};
+/// The blur of whatever is not known better, and of a far reach, whose samples are farther apart.
+constexpr double kUsualBlur = 0.8;
+constexpr double kBlurShare = 1.0 / 24.0;
+/// Answers from other sectors that give the standard deviation.
+constexpr int kDraws = 100;
+constexpr int kEllipseRounds = 2;
+/// ... times this, since what lies beside the rim goes on over more than a sector; and what no
+/// scatter shows: pixels, of the model's shape. Both so that two standard deviations hold 95 % of
+/// the errors of bench/probe_accuracy.
+constexpr double kDrawnFactor = 1.5;
+constexpr double kModelSigma = 0.15;
+/// Share of the rays that show a rim somewhere within reach and do so at the outline by chance.
+constexpr double kChance = 0.2;
+
+double aboveChance(double share)
 {
-    const std::vector<RimRay> rim =
-        locateRim(picture, near, outlineRays(near.radius), kReachTolerances * tolerance);
-    const std::optional<OutlineFit> fit =
-        fitOutline(rim, near, ellipse, {2.0 * tolerance, 2.0 * tolerance});
-    if (!fit) return std::nullopt;
-    return fitOutline(rim, fit->outline, ellipse, {inside_share * tolerance, tolerance});
+    return std::max((share - kChance) / (1.0 - kChance), 0.0);
 }
 
-BallOutline ballFrom(const OutlinePicture& picture, const OutlineFit& fit)
+BallOutline ballFrom(const OutlinePicture& picture, const JointFit& fit)
 {
     BallOutline ball;
     ball.center_px = fit.outline.center;
@@ -162,60 +128,83 @@ BallOutline ballFrom(const OutlinePicture& picture, const OutlineFit& fit)
     ball.axis_ratio = (1.0 - e) / (1.0 + e);
     ball.axis_angle = 0.5 * std::atan2(fit.outline.stretch.y, fit.outline.stretch.x);
     if (ball.axis_angle < 0.0) ball.axis_angle += pi;
-    ball.center_sigma = fit.center_sigma;
-    ball.radius_sigma = fit.radius_sigma;
-    return withShares(picture, ball);
-}
-
-/// From a fit whose places lie on both sides to one whose places inside hardly count, with a
-/// tolerance that shrinks as long as most stay. Before a plain wall a rim shows little, and what is
-/// mirrored beside it pulls a fit inwards.
-OutlineFit fitOuterEdge(const OutlinePicture& picture,
-                        const OutlineFit& both_sides,
-                        bool ellipse,
-                        double tolerance)
-{
-    OutlineFit best = both_sides;
-    for (bool first = true;; first = false, tolerance *= 0.5) {
-        const std::optional<OutlineFit> next =
-            fitRim(picture, best.outline, ellipse, tolerance, kInsideShare);
-        if (!next || (!first && next->inliers < kKeptShare * best.inliers)) return best;
-        best = *next;
-        if (tolerance <= kFinestTolerance) return best;
-    }
+    ball.center_sigma = std::hypot(kDrawnFactor * fit.center_sigma, kModelSigma);
+    ball.radius_sigma = std::hypot(kDrawnFactor * fit.radius_sigma, kModelSigma);
+    ball.visible_share = visibleShare(picture, fit.outline);
+    ball.inlier_share = aboveChance(fit.share);
+    return ball;
 }
 
 }  // namespace
 
-std::optional<BallOutline> refineOutline(const OutlinePicture& picture,
-                                         Outline outline,
-                                         double window,
-                                         bool ellipse)
+BallOutline withShares(const OutlinePicture& picture, BallOutline ball)
 {
+    const Outline outline = outlineOf(ball);
+    ball.visible_share = visibleShare(picture, outline);
+    const RimCosts costs = rimCosts(picture, outline, kLastReach, kUsualBlur);
+    ball.inlier_share = aboveChance(shareOfRim(costs, outline, kLastReach));
+    return ball;
+}
+
+std::optional<BallOutline> approachOutline(const OutlinePicture& picture,
+                                           Outline outline,
+                                           double window,
+                                           bool ellipse)
+{
+    const glm::dvec2 shape = outline.stretch;
+    const bool shape_known = shape != glm::dvec2(0.0);
     for (;; window *= 0.4) {
         const std::optional<OutlineFit> fit =
             searchNear(picture, outline, outlineRays(outline.radius), window, ellipse);
         if (!fit) return std::nullopt;
         outline = fit->outline;
+        if (shape_known) outline.stretch = shape;
         if (window <= 5.0 || window <= 0.02 * outline.radius) break;
     }
-    const double tolerance = toleranceFor(outline.radius);
     // Two more numbers to find need more room to find them in.
-    const double first =
-        ellipse ? std::max(tolerance, kEllipseTolerance * outline.radius) : tolerance;
-    std::optional<OutlineFit> fit = fitRim(picture, outline, ellipse, first, 1.0);
-    if (fit) fit = fitRim(picture, fit->outline, ellipse, tolerance, 1.0);
+    double reach = std::max((ellipse ? 2.0 : 1.0) * kFirstReach * outline.radius, kLastReach);
+    for (;; reach = std::max(kReachStep * reach, kLastReach)) {
+        const double blur = std::max(reach * kBlurShare, kUsualBlur);
+        const RimCosts costs = rimCosts(picture, outline, reach, blur);
+        const std::optional<JointFit> fit =
+            fitJointly(costs, outline, ellipse && !shape_known, reach, 0);
+        if (!fit) return std::nullopt;
+        outline = fit->outline;
+        if (reach <= kLastReach) return ballFrom(picture, *fit);
+    }
+}
+
+std::optional<BallOutline> refineOutline(const OutlinePicture& picture,
+                                         const BallOutline& near,
+                                         bool ellipse)
+{
+    const Outline outline = outlineOf(near);
+    double blur = kUsualBlur;
+    double least = std::numeric_limits<double>::infinity();
+    RimCosts best;
+    for (const double tried : kBlurs) {
+        RimCosts costs = rimCosts(picture, outline, kLastReach, tried);
+        if (costs.least >= least) continue;
+        least = costs.least;
+        blur = tried;
+        best = std::move(costs);
+    }
+    std::optional<JointFit> fit = fitJointly(best, outline, ellipse, kLastReach, 0);
     if (!fit) return std::nullopt;
-    const BallOutline middle = ballFrom(picture, *fit);
-    const BallOutline outer = ballFrom(picture, fitOuterEdge(picture, *fit, ellipse, tolerance));
-    BallOutline ball = outer.inlier_share >= kOuterEdgeShare * middle.inlier_share ? outer : middle;
-    // What the scatter does not show: where both speak for themselves, how much the answer depends
-    // on the choice.
-    if (middle.inlier_share < kOuterEdgeShare * outer.inlier_share) return ball;
-    ball.center_sigma =
-        std::hypot(ball.center_sigma, 0.5 * glm::length(outer.center_px - middle.center_px));
-    ball.radius_sigma = std::hypot(ball.radius_sigma, 0.5 * (outer.radius_px - middle.radius_px));
-    return ball;
+    // Once more about the answer, whose own profiles are averaged along the outline itself; an
+    // ellipse takes longer to settle.
+    for (int i = 0; i < kEllipseRounds && fit && ellipse; ++i)
+        fit = fitJointly(rimCosts(picture, fit->outline, kLastReach, blur),
+                         Outline(fit->outline),
+                         ellipse,
+                         kLastReach,
+                         0);
+    if (!fit) return std::nullopt;
+    const Outline again = fit->outline;
+    fit =
+        fitJointly(rimCosts(picture, again, kLastReach, blur), again, ellipse, kLastReach, kDraws);
+    if (!fit) return std::nullopt;
+    return ballFrom(picture, *fit);
 }
 
 }  // namespace insitu::detail

@@ -22,11 +22,17 @@ namespace insitu::detail {
 /// The outline with what the picture says about it: both its shares.
 [[nodiscard]] BallOutline withShares(const OutlinePicture& picture, BallOutline ball);
 
-/// To a fraction of a pixel, from an outline that is right within `window` pixels: consensus in
-/// windows that shrink, then the rim's model.
+/// From an outline that is right within `window` pixels to one that is right within about a pixel:
+/// consensus in windows that shrink, then the rim's likelihood. An ellipse keeps the shape of the
+/// one it starts from: where a ball is changes it little. Without standard deviations.
+[[nodiscard]] std::optional<BallOutline> approachOutline(const OutlinePicture& picture,
+                                                         Outline outline,
+                                                         double window,
+                                                         bool ellipse);
+
+/// From there to a fraction of a pixel; `ellipse`: the shape is looked for as well.
 [[nodiscard]] std::optional<BallOutline> refineOutline(const OutlinePicture& picture,
-                                                       Outline outline,
-                                                       double window,
+                                                       const BallOutline& near,
                                                        bool ellipse);
 
 }  // namespace insitu::detail

@@ -111,7 +111,7 @@ std::optional<BallOutline> searchPicture(const OutlinePicture& picture,
         start.center *= factor;
         start.radius *= factor;
         const std::optional<BallOutline> ball =
-            refineOutline(picture, start, 3.0 * factor + 2.0, options.ellipse);
+            approachOutline(picture, start, 3.0 * factor + 2.0, options.ellipse);
         if (!ball) continue;
         const double score =
             ball->inlier_share * ball->visible_share * std::pow(ball->radius_px, kSizeBonus);
@@ -120,7 +120,8 @@ std::optional<BallOutline> searchPicture(const OutlinePicture& picture,
         most = score;
         best = ball;
     }
-    return best;
+    if (!best) return std::nullopt;
+    return refineOutline(picture, *best, options.ellipse);
 }
 
 }  // namespace insitu::detail

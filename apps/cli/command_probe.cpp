@@ -48,9 +48,13 @@ void placeOutline(const Image<Rgb>& radiance,
     ball.center_px = 0.5 * glm::dvec2(radiance.width(), radiance.height());
     ball.radius_px = 0.5 * std::min(radiance.width(), radiance.height());
     if (!arguments.center_px || !arguments.radius_px) {
-        // A doubtful circle is no better than the usual crop, which the ball fills.
+        // A circle this uncertain is no better than the usual crop, which the ball fills.
+        constexpr double kUselessSigma = 0.05;  // share of the radius
         BallOutlineResult found = findBallOutline(radiance);
-        if (hasFinding(found.findings, "ball-outline-weak")) found.outline.reset();
+        if (found.outline && std::max(found.outline->center_sigma, found.outline->radius_sigma) >
+                                 kUselessSigma * found.outline->radius_px)
+            found.outline.reset();
+        if (found.outline) findings = found.findings;  // a doubtful one says so
         if (found.outline) {
             ball.center_px = found.outline->center_px;
             ball.radius_px = found.outline->radius_px;
