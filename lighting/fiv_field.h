@@ -40,7 +40,9 @@ public:
     [[nodiscard]] IrradianceVector at(glm::vec3 x_local) const;
     /// N·FIV of the hidden light of many places, >= 0, with the thesis's shadow cases by the plane
     /// through each place: an object wholly behind it hides nothing, one that the plane cuts counts
-    /// by the share (d + R) / 2R of its sphere in front. Source: [Michael10] 3.3.3.1.
+    /// by the share (d + R) / 2R in front. R is the half extent of the object's box along the
+    /// normal, where the thesis has the sphere's radius: what stands on a floor is not cut by it.
+    /// Source: [Michael10] 3.3.3.1.
     void hiddenIrradiance(std::span<const glm::vec3> places_local,
                           std::span<const glm::vec3> unit_normals,
                           std::span<Rgb> hidden) const;
@@ -61,6 +63,7 @@ private:
     [[nodiscard]] Corners cornersOf(glm::vec3 x_local) const;
 
     ShellFieldOptions options_;
+    glm::vec3 half_extent_{1.0f};
     std::vector<Node> nodes_;  ///< azimuth runs fastest, then the polar angle, then the shell
 };
 
@@ -78,7 +81,7 @@ struct PlaneFieldOptions {
     int tiles = 24;
     /// Tiles get samples until bilinear interpolation is off by no more than this, as a share of
     /// the plane's irradiance without the object. > 0.
-    double max_error = 0.004;
+    double max_error = 0.01;
     /// Most halvings of a tile, [1, 8].
     int max_level = 6;
     /// As in hiddenShares(): 0 for planes that the object stands on or before, 1 for its own

@@ -77,7 +77,7 @@ Findings ShellFieldOptions::validate() const
 }
 
 ShellField::ShellField(const ObjectLight& object, const ShellFieldOptions& options)
-    : options_(options)
+    : options_(options), half_extent_(object.local().half_extent)
 {
     requireValid(options.validate(), "shell field options");
     std::vector<glm::vec3> places;
@@ -165,8 +165,9 @@ void ShellField::hiddenIrradiance(std::span<const glm::vec3> places,
         const std::size_t end = std::min(begin + kPlacesAtATime, places.size());
         for (std::size_t i = begin; i < end; ++i) {
             const glm::vec3 n = normals[i];
-            // Height of the object's centre over the place's plane, in radii: d of the thesis.
-            const float height = -glm::dot(places[i], n);
+            // Height of the object's centre over the place's plane, in its half extents along the
+            // normal: d / R of the thesis.
+            const float height = -glm::dot(places[i], n) / glm::dot(half_extent_, glm::abs(n));
             if (height <= -1.0f) {
                 hidden[i] = Rgb(0.0f);
                 continue;

@@ -45,6 +45,7 @@ LocalFrame localFrame(const TriangleMesh& mesh)
         largest = std::max(largest, glm::dot(p - frame.center, p - frame.center));
     });
     if (largest > 0.0) frame.radius = std::sqrt(largest);
+    frame.half_extent = glm::vec3((high - frame.center) / frame.radius);
     return frame;
 }
 

@@ -18,6 +18,7 @@ namespace insitu {
 struct LocalFrame {
     glm::dvec3 center{0.0};
     double radius = 1.0;
+    glm::vec3 half_extent{1.0f};  ///< of the bounding box around the centre, in radii
 
     [[nodiscard]] glm::vec3 localFrom(glm::dvec3 x) const { return {(x - center) / radius}; }
 };

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMaxBytes = std::size_t{4} << 30;
 /// To be raised whenever an atlas of the same mesh and options would come out differently.
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 
 /// First bytes of an atlas file. The arrays follow: frames, coverage, depths.
 struct Header {
@@ -26,7 +26,7 @@ struct Header {
     std::uint32_t version = kVersion;
     std::uint32_t byte_order = 0x01020304;
     std::int32_t face_size = 0, resolution = 0, samples = 0, unused = 0;
-    std::array<double, 4> local{};  ///< centre, radius
+    std::array<double, 7> local{};  ///< centre, radius, half extent
     std::uint64_t payload_bytes = 0;
     std::uint64_t payload_hash = 0;
     std::array<std::uint64_t, 2> content{};  ///< hash of mesh and options
@@ -91,7 +91,13 @@ std::string fileBytes(const VisibilityAtlas& atlas, const std::array<std::uint64
     header.face_size = atlas.options.face_size;
     header.resolution = atlas.options.resolution;
     header.samples = atlas.options.samples;
-    header.local = {local.center.x, local.center.y, local.center.z, local.radius};
+    header.local = {local.center.x,
+                    local.center.y,
+                    local.center.z,
+                    local.radius,
+                    local.half_extent.x,
+                    local.half_extent.y,
+                    local.half_extent.z};
     header.payload_bytes = bytes.size() - sizeof(Header);
     header.payload_hash = XXH3_64bits(bytes.data() + sizeof(Header), header.payload_bytes);
     header.content = content;
@@ -118,7 +124,10 @@ std::optional<VisibilityAtlas> atlasFromBytes(const std::vector<std::uint8_t>& b
     VisibilityAtlas atlas;
     atlas.options = options;
     SilhouetteSet& set = atlas.silhouettes;
-    set.local = {{header.local[0], header.local[1], header.local[2]}, header.local[3]};
+    const auto& local = header.local;
+    set.local.center = {local[0], local[1], local[2]};
+    set.local.radius = local[3];
+    set.local.half_extent = glm::vec3(glm::dvec3(local[4], local[5], local[6]));
     set.resolution = options.resolution;
     set.directions = cellDirections(atlas.cells());
     const std::size_t pairs = atlas.cells().pairCount();

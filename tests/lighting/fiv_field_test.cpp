@@ -100,15 +100,19 @@ TEST_F(Field, ShellsKnowTheThesisShadowCases)
     const glm::vec3 x(2.0f, 0.0f, 0.0f);  // the object lies along -x
     const std::vector<glm::vec3> places(4, x);
     const glm::vec3 across = glm::normalize(glm::vec3(-0.1f, 1.0f, 0.0f));
-    const std::vector<glm::vec3> normals = {
-        {-1, 0, 0}, across, glm::normalize(glm::vec3(0.3f, 1, 0)), {1, 0, 0}};
+    const glm::vec3 standing(0, 1, 0);
+    const std::vector<glm::vec3> normals = {{-1, 0, 0}, across, standing, {1, 0, 0}};
+    const glm::vec3 half = object_.local().half_extent;
+    std::vector<glm::vec3> own = places;
+    own[2].y = -half.y;  // the floor that it stands on
     std::vector<Rgb> hidden(4);
-    field.hiddenIrradiance(places, normals, hidden);
+    field.hiddenIrradiance(own, normals, hidden);
     const IrradianceVector v = field.at(x);
     EXPECT_NEAR(hidden[0].g, v.along(normals[0]).g, 1e-5) << "A: wholly in front";
-    const float share = 0.5f * (2.0f * 0.1f / std::sqrt(1.01f) + 1.0f);
+    const float reach = (0.1f * half.x + half.y) / std::sqrt(1.01f);
+    const float share = 0.5f * (0.2f / std::sqrt(1.01f) / reach + 1.0f);
     EXPECT_NEAR(hidden[1].g, std::max(0.0f, share * v.along(across).g), 1e-5) << "B: cut";
-    EXPECT_GE(hidden[2].g, 0.0f);
+    EXPECT_NEAR(hidden[2].g, field.at(own[2]).along(standing).g, 1e-5) << "A: on the floor";
     EXPECT_EQ(hidden[3], Rgb(0.0f)) << "C: behind";
 }
 
