@@ -54,7 +54,7 @@ struct LightSplitOptions {
     int max_fine_directions = 48;
     /// Light counts as concentrated while its cell's share of all light times its spread around the
     /// cell's direction is above this. Radians, >= 0.
-    double spread_tolerance = 2e-4;
+    double spread_tolerance = 5e-5;
 
     [[nodiscard]] Findings validate() const;
 };

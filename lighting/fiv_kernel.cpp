@@ -53,13 +53,13 @@ struct Look {
     float undecided = 0.0f;
 };
 
-INSITU_KERNEL Look lookAt(const SilhouetteSet& set, std::size_t index, float bias)
+INSITU_KERNEL Look lookAt(const SilhouetteFrame& frame, int resolution, float bias)
 {
-    Look look{set.frames[index]};
+    Look look{frame};
     look.column_size = size(look.frame.column_axis);
     look.row_size = size(look.frame.row_axis);
     look.depth_size = size(look.frame.depth_axis);
-    look.edge = static_cast<float>(set.resolution - 1);
+    look.edge = static_cast<float>(resolution - 1);
     look.undecided = (0.5f + std::abs(bias)) * look.frame.texel_depth;
     return look;
 }
@@ -224,6 +224,26 @@ INSITU_KERNEL void accumulate(const float* share, const float* flux, Block& bloc
     }
 }
 
+/// Shares of the sides that concern a block; false when nothing covers its places.
+INSITU_KERNEL bool sharesOf(const Look& look,
+                            const SilhouetteSet& set,
+                            std::size_t silhouette,
+                            const Block& block,
+                            std::uint32_t concern,
+                            float bias,
+                            Projected& p)
+{
+    project(look, block, set.resolution, p);
+    if (!loadCoverage(set.coverageOf(silhouette), set.resolution, p)) return false;
+    if ((concern & kDepth) != 0) {
+        loadDepths(look, block, set.depthsOf(silhouette), set.resolution, p);
+        sharesByDepth(look, bias, p);
+    } else {
+        shareOfCoverage(p, (concern & kAlong) != 0 ? p.along : p.against);
+    }
+    return true;
+}
+
 template <Sum kSum>
 INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
 {
@@ -231,22 +251,15 @@ INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
     constexpr auto kNumbers = static_cast<std::size_t>(fluxNumbers(kSum));
     Projected p;
     alignas(64) std::uint32_t found[Group::kBlocks];
-    for (std::size_t direction = 0; direction < set.frames.size(); ++direction) {
+    for (std::size_t direction = 0; direction < source.shines.size(); ++direction) {
         const std::uint32_t shines = source.shines[direction];
         if (shines == 0) continue;
-        const Look look = lookAt(set, direction, bias);
+        const Look look = lookAt(set.frames[direction], set.resolution, bias);
         concerns(look, group, shines, found);
         for (int b = 0; b < group.count; ++b) {
             if ((found[b] & (kAlong | kAgainst)) == 0) continue;
             Block& block = group.blocks[b];
-            project(look, block, set.resolution, p);
-            if (!loadCoverage(set.coverageOf(direction), set.resolution, p)) continue;
-            if ((found[b] & kDepth) != 0) {
-                loadDepths(look, block, set.depthsOf(direction), set.resolution, p);
-                sharesByDepth(look, bias, p);
-            } else {
-                shareOfCoverage(p, (found[b] & kAlong) != 0 ? p.along : p.against);
-            }
+            if (!sharesOf(look, set, direction, block, found[b], bias, p)) continue;
             if ((found[b] & kAlong) != 0)
                 accumulate<kSum>(p.along, source.along.data() + direction * kNumbers, block);
             if ((found[b] & kAgainst) != 0)
@@ -255,38 +268,140 @@ INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
     }
 }
 
-INSITU_KERNEL void sumAny(Sum sum, const Source& source, float bias, Group& group)
+/// What several objects leave of the light of a block: multiplied by each one's shares.
+struct Left {
+    alignas(64) float along[kSize], against[kSize];
+    bool any = false;
+
+    INSITU_KERNEL void start()
+    {
+        any = false;
+        for (int i = 0; i < kSize; ++i)
+            along[i] = against[i] = 1.0f;
+    }
+    INSITU_KERNEL static void take(float* left, const float* share)
+    {
+        for (int i = 0; i < kSize; ++i)
+            left[i] *= 1.0f - share[i];
+    }
+    INSITU_KERNEL static void invert(float* left)
+    {
+        for (int i = 0; i < kSize; ++i)
+            left[i] = 1.0f - left[i];
+    }
+};
+
+template <Sum kSum>
+INSITU_KERNEL void sumUnion(const Source& light,
+                            std::span<const Occluder> occluders,
+                            float bias,
+                            std::span<Group> groups)
 {
-    switch (sum) {
-        case Sum::Vectors:
-            return sumDirections<Sum::Vectors>(source, bias, group);
-        case Sum::Irradiance:
-            return sumDirections<Sum::Irradiance>(source, bias, group);
-        case Sum::PerPlace:
-            return sumDirections<Sum::PerPlace>(source, bias, group);
+    constexpr auto kNumbers = static_cast<std::size_t>(fluxNumbers(kSum));
+    Projected p;
+    Left left;
+    std::vector<Look> looks(occluders.size());
+    std::vector<std::uint32_t> found(occluders.size() * Group::kBlocks);
+    for (std::size_t direction = 0; direction < light.shines.size(); ++direction) {
+        const std::uint32_t shines = light.shines[direction];
+        if (shines == 0) continue;
+        for (std::size_t k = 0; k < occluders.size(); ++k) {
+            const Occluder& o = occluders[k];
+            looks[k] = lookAt(o.frames[direction], o.set->resolution, bias);
+            const std::uint32_t own =
+                o.swapped[direction] != 0 ? (shines >> 1) | ((shines & 1u) << 1) : shines;
+            concerns(looks[k], groups[k], own, found.data() + k * Group::kBlocks);
+        }
+        for (int b = 0; b < groups[0].count; ++b) {
+            left.start();
+            for (std::size_t k = 0; k < occluders.size(); ++k) {
+                const Occluder& o = occluders[k];
+                const std::uint32_t concern =
+                    found[k * Group::kBlocks + static_cast<std::size_t>(b)];
+                if ((concern & (kAlong | kAgainst)) == 0) continue;
+                if (!sharesOf(looks[k],
+                              *o.set,
+                              o.silhouettes[direction],
+                              groups[k].blocks[b],
+                              concern,
+                              bias,
+                              p))
+                    continue;
+                const bool swapped = o.swapped[direction] != 0;
+                if ((concern & kAlong) != 0)
+                    Left::take(swapped ? left.against : left.along, p.along);
+                if ((concern & kAgainst) != 0)
+                    Left::take(swapped ? left.along : left.against, p.against);
+                left.any = true;
+            }
+            if (!left.any) continue;
+            Left::invert(left.along);
+            Left::invert(left.against);
+            Block& block = groups[0].blocks[b];
+            if ((shines & 1u) != 0)
+                accumulate<kSum>(left.along, light.along.data() + direction * kNumbers, block);
+            if ((shines & 2u) != 0)
+                accumulate<kSum>(left.against, light.against.data() + direction * kNumbers, block);
+        }
     }
 }
 
-void sumBase(Sum sum, const Source& source, float bias, Group& group)
+/// Everything that a sum is made from; no occluders: the source's own set.
+struct Job {
+    const Source& source;
+    std::span<const Occluder> occluders;
+    float bias = 0.0f;
+    std::span<Group> groups;
+};
+
+template <Sum kSum>
+INSITU_KERNEL void sumJob(const Job& job)
 {
-    sumAny(sum, source, bias, group);
+    if (job.occluders.empty())
+        sumDirections<kSum>(job.source, job.bias, job.groups[0]);
+    else
+        sumUnion<kSum>(job.source, job.occluders, job.bias, job.groups);
+}
+
+INSITU_KERNEL void sumAny(Sum sum, const Job& job)
+{
+    switch (sum) {
+        case Sum::Vectors:
+            return sumJob<Sum::Vectors>(job);
+        case Sum::Irradiance:
+            return sumJob<Sum::Irradiance>(job);
+        case Sum::PerPlace:
+            return sumJob<Sum::PerPlace>(job);
+    }
+}
+
+void sumBase(Sum sum, const Job& job)
+{
+    sumAny(sum, job);
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void sumAvx2(Sum sum,
-                                             const Source& source,
-                                             float bias,
-                                             Group& group)
+__attribute__((target("avx2"))) void sumAvx2(Sum sum, const Job& job)
 {
-    sumAny(sum, source, bias, group);
+    sumAny(sum, job);
 }
 
 __attribute__((target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512"))) void
-sumAvx512(Sum sum, const Source& source, float bias, Group& group)
+sumAvx512(Sum sum, const Job& job)
 {
-    sumAny(sum, source, bias, group);
+    sumAny(sum, job);
 }
 #endif
+
+void dispatch(Isa isa, Sum sum, const Job& job)
+{
+    INSITU_CHECK(static_cast<int>(isa) <= static_cast<int>(bestIsa()), "instruction set");
+#if defined(__x86_64__)
+    if (isa == Isa::Avx512) return sumAvx512(sum, job);
+    if (isa == Isa::Avx2) return sumAvx2(sum, job);
+#endif
+    sumBase(sum, job);
+}
 
 }  // namespace
 
@@ -307,12 +422,21 @@ Isa bestIsa()
 
 void addHidden(Isa isa, Sum sum, const Source& source, float bias_texels, Group& group)
 {
-    INSITU_CHECK(static_cast<int>(isa) <= static_cast<int>(bestIsa()), "instruction set");
-#if defined(__x86_64__)
-    if (isa == Isa::Avx512) return sumAvx512(sum, source, bias_texels, group);
-    if (isa == Isa::Avx2) return sumAvx2(sum, source, bias_texels, group);
-#endif
-    sumBase(sum, source, bias_texels, group);
+    dispatch(isa, sum, {source, {}, bias_texels, {&group, 1}});
+}
+
+void addHiddenByAny(Isa isa,
+                    Sum sum,
+                    const Source& light,
+                    std::span<const Occluder> occluders,
+                    float bias_texels,
+                    std::span<Group> groups)
+{
+    INSITU_CHECK(!occluders.empty() && occluders.size() == groups.size(),
+                 "{} groups for {} occluders",
+                 groups.size(),
+                 occluders.size());
+    dispatch(isa, sum, {light, occluders, bias_texels, groups});
 }
 
 }  // namespace insitu::fiv

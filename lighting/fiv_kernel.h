@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace insitu::fiv {
@@ -41,9 +42,18 @@ enum class Sum {
 
 /// A set of silhouettes with the light of ω and −ω of each, `fluxNumbers` a direction.
 struct Source {
-    const SilhouetteSet* set = nullptr;
+    const SilhouetteSet* set = nullptr;  ///< not needed where occluders are given
     std::vector<float> along, against;
     std::vector<std::uint8_t> shines;  ///< bit 0: along, bit 1: against
+};
+
+/// One of several objects before the same light: which of its silhouettes answers for each of the
+/// light's directions, and how places are seen in it.
+struct Occluder {
+    const SilhouetteSet* set = nullptr;
+    std::vector<std::uint32_t> silhouettes;
+    std::vector<SilhouetteFrame> frames;
+    std::vector<std::uint8_t> swapped;  ///< 1: the light's ω is the silhouette's −ω
 };
 
 /// Instruction sets that the sums were compiled for. All give the same bytes.
@@ -52,5 +62,15 @@ enum class Isa { Base, Avx2, Avx512 };
 
 /// Adds to the blocks' sums what the object hides from their places, direction by direction.
 void addHidden(Isa isa, Sum sum, const Source& source, float bias_texels, Group& group);
+
+/// The same for what at least one of several objects hides, exactly where coverage is 0 or 1; parts
+/// of a texel count as independent. One group an occluder, with the same places in its own local
+/// frame; sums are added to those of the first group.
+void addHiddenByAny(Isa isa,
+                    Sum sum,
+                    const Source& light,
+                    std::span<const Occluder> occluders,
+                    float bias_texels,
+                    std::span<Group> groups);
 
 }  // namespace insitu::fiv

@@ -2,10 +2,9 @@
 
 #include "core/check.h"
 #include "core/parallel.h"
-#include "lighting/fiv_kernel.h"
+#include "lighting/fiv_groups.h"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 
 namespace insitu {
@@ -17,87 +16,14 @@ using fiv::Group;
 using fiv::Source;
 using fiv::Sum;
 
-/// Lists the light of directions the way the kernel wants it.
-Source sourceOf(const SilhouetteSet& set,
-                std::span<const IrradianceVector> along,
-                std::span<const IrradianceVector> against,
-                Sum sum,
-                glm::vec3 normal)
-{
-    Source source;
-    source.set = &set;
-    source.shines.resize(set.frames.size());
-    const auto list = [&](std::span<const IrradianceVector> light, unsigned bit) {
-        std::vector<float> flux;
-        flux.reserve(light.size() * static_cast<std::size_t>(fluxNumbers(sum)));
-        for (std::size_t i = 0; i < light.size(); ++i) {
-            bool shines = false;
-            for (const glm::vec3& channel : light[i].channels) {
-                if (sum == Sum::Irradiance) {
-                    flux.push_back(std::max(0.0f, glm::dot(channel, normal)));
-                    shines = shines || flux.back() > 0.0f;
-                    continue;
-                }
-                for (int axis = 0; axis < 3; ++axis)
-                    flux.push_back(channel[axis]);
-                shines = shines || channel != glm::vec3(0.0f);
-            }
-            if (shines) source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
-        }
-        return flux;
-    };
-    source.along = list(along, 1u);
-    source.against = list(against, 2u);
-    return source;
-}
-
 std::vector<Source> sourcesOf(const ObjectLight& object, Sum sum, glm::vec3 normal)
 {
     std::vector<Source> sources;
-    sources.push_back(
-        sourceOf(object.atlas->silhouettes, object.light.along, object.light.against, sum, normal));
+    sources.push_back(sourceOf(
+        &object.atlas->silhouettes, object.light.along, object.light.against, sum, normal));
     if (!object.fine.frames.empty())
-        sources.push_back(sourceOf(object.fine, object.light.fine, {}, sum, normal));
+        sources.push_back(sourceOf(&object.fine, object.light.fine, {}, sum, normal));
     return sources;
-}
-
-bool isFinite(glm::vec3 v)
-{
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-/// Fills a block with the places (and normals) from `begin` on, and the ball around it.
-void fillBlock(Group& group,
-               std::size_t index,
-               std::span<const glm::vec3> places,
-               std::span<const glm::vec3> normals,
-               std::size_t begin)
-{
-    Block& block = group.blocks[index];
-    glm::vec3 low = places[std::min(begin, places.size() - 1)];
-    glm::vec3 high = low;
-    for (std::size_t i = 0; i < Block::kSize; ++i) {
-        const std::size_t from = std::min(begin + i, places.size() - 1);
-        const glm::vec3 p = places[from];
-        INSITU_CHECK(isFinite(p), "place {} is ({}, {}, {})", from, p.x, p.y, p.z);
-        block.x[i] = p.x;
-        block.y[i] = p.y;
-        block.z[i] = p.z;
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-        if (normals.empty()) continue;
-        block.nx[i] = normals[from].x;
-        block.ny[i] = normals[from].y;
-        block.nz[i] = normals[from].z;
-    }
-    for (auto& row : block.sums)
-        std::fill(std::begin(row), std::end(row), 0.0f);
-    const glm::vec3 center = 0.5f * (low + high);
-    group.x[index] = center.x;
-    group.y[index] = center.y;
-    group.z[index] = center.z;
-    // A little more, for rounding.
-    group.radius[index] = 0.5f * glm::length(high - low) * 1.001f + 1e-5f * glm::length(center);
 }
 
 /// Calls take(block, place, i) with the sums of every place.
@@ -117,17 +43,12 @@ void sumHidden(const std::vector<Source>& sources,
         const auto group = std::make_unique<Group>();
         group->count = static_cast<int>((end - begin + Block::kSize - 1) / Block::kSize);
         for (std::size_t b = 0; b < Group::kBlocks; ++b)
-            fillBlock(*group, b, places, normals, begin + b * Block::kSize);
+            fiv::fillBlock(*group, b, places, normals, begin + b * Block::kSize);
         for (const Source& source : sources)
             fiv::addHidden(fiv::bestIsa(), sum, source, bias_texels, *group);
         for (std::size_t i = begin; i < end; ++i)
             take(group->blocks[(i - begin) / Block::kSize], i, (i - begin) % Block::kSize);
     });
-}
-
-Rgb irradianceAt(const Block& block, std::size_t i)
-{
-    return {block.sums[0][i], block.sums[1][i], block.sums[2][i]};
 }
 
 }  // namespace
@@ -181,10 +102,7 @@ void hiddenVectors(const ObjectLight& object,
               {},
               bias_texels,
               [&](const Block& block, std::size_t place, std::size_t i) {
-                  for (int c = 0; c < 3; ++c)
-                      for (int axis = 0; axis < 3; ++axis)
-                          hidden[place].channels[static_cast<std::size_t>(c)][axis] =
-                              block.sums[3 * c + axis][i];
+                  hidden[place] = fiv::vectorOf(block, i);
               });
 }
 
@@ -205,7 +123,7 @@ void hiddenIrradiance(const ObjectLight& object,
               unit_normals,
               bias_texels,
               [&](const Block& block, std::size_t place, std::size_t i) {
-                  hidden[place] = irradianceAt(block, i);
+                  hidden[place] = fiv::irradianceOf(block, i);
               });
 }
 
@@ -222,7 +140,7 @@ void hiddenIrradiance(const ObjectLight& object,
               {},
               bias_texels,
               [&](const Block& block, std::size_t place, std::size_t i) {
-                  hidden[place] = irradianceAt(block, i);
+                  hidden[place] = fiv::irradianceOf(block, i);
               });
 }
 

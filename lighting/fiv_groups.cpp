@@ -1,0 +1,85 @@
+#include "lighting/fiv_groups.h"
+
+#include "core/check.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace insitu::fiv {
+
+namespace {
+
+bool isFinite(glm::vec3 v)
+{
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+}  // namespace
+
+Source sourceOf(const SilhouetteSet* set,
+                std::span<const IrradianceVector> along,
+                std::span<const IrradianceVector> against,
+                Sum sum,
+                glm::vec3 normal)
+{
+    Source source;
+    source.set = set;
+    source.shines.resize(along.size());
+    const auto list = [&](std::span<const IrradianceVector> light, unsigned bit) {
+        std::vector<float> flux;
+        flux.reserve(light.size() * static_cast<std::size_t>(fluxNumbers(sum)));
+        for (std::size_t i = 0; i < light.size(); ++i) {
+            bool shines = false;
+            for (const glm::vec3& channel : light[i].channels) {
+                if (sum == Sum::Irradiance) {
+                    flux.push_back(std::max(0.0f, glm::dot(channel, normal)));
+                    shines = shines || flux.back() > 0.0f;
+                    continue;
+                }
+                for (int axis = 0; axis < 3; ++axis)
+                    flux.push_back(channel[axis]);
+                shines = shines || channel != glm::vec3(0.0f);
+            }
+            if (shines) source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
+        }
+        return flux;
+    };
+    source.along = list(along, 1u);
+    source.against = list(against, 2u);
+    return source;
+}
+
+void fillBlock(Group& group,
+               std::size_t index,
+               std::span<const glm::vec3> places,
+               std::span<const glm::vec3> normals,
+               std::size_t begin)
+{
+    Block& block = group.blocks[index];
+    glm::vec3 low = places[std::min(begin, places.size() - 1)];
+    glm::vec3 high = low;
+    for (std::size_t i = 0; i < Block::kSize; ++i) {
+        const std::size_t from = std::min(begin + i, places.size() - 1);
+        const glm::vec3 p = places[from];
+        INSITU_CHECK(isFinite(p), "place {} is ({}, {}, {})", from, p.x, p.y, p.z);
+        block.x[i] = p.x;
+        block.y[i] = p.y;
+        block.z[i] = p.z;
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+        if (normals.empty()) continue;
+        block.nx[i] = normals[from].x;
+        block.ny[i] = normals[from].y;
+        block.nz[i] = normals[from].z;
+    }
+    for (auto& row : block.sums)
+        std::fill(std::begin(row), std::end(row), 0.0f);
+    const glm::vec3 center = 0.5f * (low + high);
+    group.x[index] = center.x;
+    group.y[index] = center.y;
+    group.z[index] = center.z;
+    // A little more, for rounding.
+    group.radius[index] = 0.5f * glm::length(high - low) * 1.001f + 1e-5f * glm::length(center);
+}
+
+}  // namespace insitu::fiv

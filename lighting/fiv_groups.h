@@ -1,0 +1,42 @@
+#pragma once
+
+#include "lighting/cell_light.h"
+#include "lighting/fiv_kernel.h"
+
+#include <glm/glm.hpp>
+
+#include <span>
+
+namespace insitu::fiv {
+
+/// Lists the light of directions the way the kernel wants it. `against` may be empty; `normal`
+/// matters for Sum::Irradiance only.
+[[nodiscard]] Source sourceOf(const SilhouetteSet* set,
+                              std::span<const IrradianceVector> along,
+                              std::span<const IrradianceVector> against,
+                              Sum sum,
+                              glm::vec3 normal);
+
+/// Fills a block with the places (and normals, if any) from `begin` on, and the ball around it;
+/// sums become 0. Places that are not finite are a LogicError.
+void fillBlock(Group& group,
+               std::size_t index,
+               std::span<const glm::vec3> places,
+               std::span<const glm::vec3> normals,
+               std::size_t begin);
+
+/// What a block's sums are, by Sum.
+[[nodiscard]] inline Rgb irradianceOf(const Block& block, std::size_t i)
+{
+    return {block.sums[0][i], block.sums[1][i], block.sums[2][i]};
+}
+[[nodiscard]] inline IrradianceVector vectorOf(const Block& block, std::size_t i)
+{
+    IrradianceVector v;
+    for (int c = 0; c < 3; ++c)
+        for (int axis = 0; axis < 3; ++axis)
+            v.channels[static_cast<std::size_t>(c)][axis] = block.sums[3 * c + axis][i];
+    return v;
+}
+
+}  // namespace insitu::fiv
