@@ -1,8 +1,10 @@
 #include "pipeline/insert.h"
 
+#include "calib/camera_formats.h"
 #include "calib/photo_calibration.h"
 #include "core/color.h"
 #include "core/io/image_io.h"
+#include "pipeline/probe_location.h"
 #include "pipeline/stage_cache.h"
 #include "pipeline/stage_parts.h"
 
@@ -253,9 +255,10 @@ CameraEstimate solveCamera(const Project& project, const Photo& photo, bool use_
                                          height));
     };
     if (project.camera_file) {
-        CameraEstimate estimate = readCamera(source);
-        demandSize(estimate.camera.width, estimate.camera.height);
-        return estimate;
+        CameraReading reading;
+        reading.size_px = glm::ivec2(width, height);
+        reading.picture = project.photo.path.filename().string();
+        return readCameraFile(source, reading);
     }
     const LineSet lines = readLineSet(source);
     demandSize(lines.width, lines.height);
@@ -264,15 +267,17 @@ CameraEstimate solveCamera(const Project& project, const Photo& photo, bool use_
     return calibratePhoto(lines, photo, options, source.string());
 }
 
-InsertResult insertObjects(const Project& project, const InsertOptions& options, Progress& progress)
+InsertResult insertObjects(const Project& given, const InsertOptions& options, Progress& progress)
 {
     InsertResult result;
+    Project project = given;
     Stopwatch watch(result.times);
     result.photo = readPhoto(project.photo.path);
     append(result.findings,
            photoFindings(result.photo.metadata, project.photo.path.filename().string()));
     result.camera = solveCamera(project, result.photo, options.use_exif_focal);
     append(result.findings, result.camera.findings);
+    append(result.findings, placeProbeFromOutline(result.camera, project));
     const Camera& camera = result.camera.camera;
     watch.lap("camera");
 

@@ -103,7 +103,15 @@ ProjectProbe readProbe(const JsonNode& node, const std::filesystem::path& folder
     ProjectProbe probe;
     const bool ball = readChoice(node.at("kind"), {"mirror-ball", "latlong"}) == "mirror-ball";
     probe.kind = ball ? ProbeKind::MirrorBall : ProbeKind::LatLong;
-    probe.center_m = node.at("center_m").vec3();
+    const JsonNode center = node.at("center_m");
+    if (center.value().is_string()) {
+        (void)readChoice(center, {"from-outline"});
+        probe.center_from_outline = true;
+        if (!ball || !node.at("view").value().is_string())
+            center.fail("\"from-outline\" needs a mirror ball with \"view\": \"photo\"");
+    } else {
+        probe.center_m = center.vec3();
+    }
     if (ball) {
         readBall(node.at("ball"), probe);
         probe.ball.center_m = probe.center_m;

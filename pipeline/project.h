@@ -28,6 +28,8 @@ struct ProjectProbe {
     std::vector<ProjectImage> images;
     MirrorBall ball;  ///< center_m is set from `center_m`
     glm::dvec3 center_m{0.0};
+    /// `"center_m": "from-outline"`: placeProbeFromOutline (pipeline/probe_location.h) sets it.
+    bool center_from_outline = false;
     /// The camera of the ball pictures: its place, or nothing when it is the photograph's camera.
     std::optional<glm::dvec3> view_position_m;
     glm::dvec2 crop_origin_px{0.0};

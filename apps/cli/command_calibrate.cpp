@@ -1,7 +1,15 @@
 #include "apps/cli/command.h"
 #include "calib/automatic_calibration.h"
+#include "calib/calibration_overlay.h"
+#include "calib/camera_formats.h"
 #include "calib/photo_calibration.h"
+#include "calib/room_views.h"
+#include "core/io/file.h"
 #include "core/io/image_io.h"
+#include "core/io/json.h"
+#include "pipeline/probe_location.h"
+
+#include <iostream>
 
 namespace insitu::cli {
 
@@ -10,7 +18,15 @@ namespace {
 struct CalibrateArguments {
     std::filesystem::path photo;
     std::filesystem::path lines;
+    std::filesystem::path from;
+    std::filesystem::path views;
+    std::string picture;
     std::filesystem::path output;
+    std::filesystem::path overlay;
+    std::filesystem::path ball_photo;
+    double ball_radius_m = 0.0;
+    double ball_radius_sigma_m = 0.0;
+    std::vector<double> ball_near;
     std::optional<double> focal_px;
     bool ignore_exif_focal = false;
     bool automatic = false;
@@ -31,34 +47,116 @@ CalibrationOptions optionsOf(const CalibrateArguments& arguments)
     return options;
 }
 
-/// By hand, by hand and completed, or by itself.
-CameraEstimate estimate(const CalibrateArguments& arguments)
+/// A camera and the segments it rests on.
+struct Calibrated {
+    CameraEstimate camera;
+    std::vector<LineSegment> segments;
+};
+
+/// From another program, by hand, by hand and completed, or by itself.
+Calibrated calibrate(const CalibrateArguments& arguments, const std::optional<Photo>& photo)
 {
+    if (!arguments.from.empty()) {
+        CameraReading reading{{}, arguments.picture};
+        if (reading.picture.empty()) reading.picture = arguments.photo.filename().string();
+        if (photo)
+            reading.size_px = glm::ivec2(photo->image.codes.width(), photo->image.codes.height());
+        return {readCameraFile(arguments.from, reading), {}};
+    }
     const CalibrationOptions options = optionsOf(arguments);
-    const Photo photo = readPhoto(arguments.photo);
     if (arguments.lines.empty()) {
         AutomaticOptions automatic = arguments.automatic_options;
         if (arguments.origin_px.size() == 2)
             automatic.origin_px = glm::dvec2(arguments.origin_px[0], arguments.origin_px[1]);
-        return calibrateAutomatically(photo, options, automatic, arguments.photo.string()).camera;
+        AutomaticCalibration found =
+            calibrateAutomatically(*photo, options, automatic, arguments.photo.string());
+        return {std::move(found.camera), std::move(found.lines.segments)};
     }
     const LineSet lines = readLineSet(arguments.lines);
+    const std::string source = arguments.lines.string();
     if (!arguments.automatic)
-        return calibratePhoto(lines, photo, options, arguments.lines.string());
-    return calibrateCompleted(
-               lines, photo, options, arguments.automatic_options.lines, arguments.lines.string())
-        .camera;
+        return {calibratePhoto(lines, *photo, options, source), lines.segments};
+    AutomaticCalibration found =
+        calibrateCompleted(lines, *photo, options, arguments.automatic_options.lines, source);
+    return {std::move(found.camera), std::move(found.lines.segments)};
+}
+
+Json listOf(glm::dvec3 v)
+{
+    return Json::array({v.x, v.y, v.z});
+}
+
+/// Where the ball stands, as JSON on stdout, in the keys of a project's probe.
+void printBall(const CalibrateArguments& arguments, const CameraEstimate& camera, Context& context)
+{
+    std::optional<BallOutline> near;
+    if (arguments.ball_near.size() == 3) {
+        near.emplace();
+        near->center_px = {arguments.ball_near[0], arguments.ball_near[1]};
+        near->radius_px = arguments.ball_near[2];
+    }
+    const LocatedBall ball = locateBall(readPhoto(arguments.ball_photo),
+                                        camera,
+                                        arguments.ball_radius_m,
+                                        arguments.ball_radius_sigma_m,
+                                        near,
+                                        arguments.ball_photo.string());
+    context.print(ball.findings);
+    const Json json = {{"center_m", listOf(ball.place.center_m)},
+                       {"center_m_sigma", listOf(ball.place.sigma_m)},
+                       {"distance_m", ball.place.distance_m},
+                       {"distance_m_sigma", ball.place.distance_sigma_m},
+                       {"center_px", {ball.outline.center_px.x, ball.outline.center_px.y}},
+                       {"radius_px", ball.outline.radius_px}};
+    std::cout << json.dump(2) << "\n";
+}
+
+/// All photographs of a room at once: a camera file each, named as the view, in a folder.
+void joinAll(const CalibrateArguments& arguments, Context& context)
+{
+    const RoomViews room = readRoomViews(arguments.views);
+    std::vector<std::filesystem::path> files;
+    for (const RoomView& view : room.views) {
+        files.push_back(arguments.output / (view.name + ".json"));
+        if (std::filesystem::exists(arguments.output)) context.checkOutput(files.back());
+    }
+    const JoinedViews joined = joinViews(room, optionsOf(arguments), arguments.views.string());
+    context.print(joined.findings);
+    std::filesystem::create_directories(arguments.output);
+    for (std::size_t i = 0; i < files.size(); ++i)
+        writeCamera(files[i], joined.cameras[i]);
 }
 
 void runCalibrate(const CalibrateArguments& arguments, Context& context)
 {
     context.start();
-    if (arguments.lines.empty() && !arguments.automatic)
-        throw CLI::RequiredError("--lines or --auto");
-    context.checkOutput(arguments.output);
-    const CameraEstimate found = estimate(arguments);
-    context.print(found.findings);
-    writeCamera(arguments.output, found);
+    if (!arguments.views.empty()) {
+        joinAll(arguments, context);
+        return;
+    }
+    if (arguments.from.empty() && arguments.lines.empty() && !arguments.automatic)
+        throw CLI::RequiredError("--lines, --auto, --from or --views");
+    if (arguments.photo.empty() && (arguments.from.empty() || !arguments.overlay.empty()))
+        throw CLI::RequiredError("photo");
+    for (const std::filesystem::path& file : cameraFilesOf(arguments.output))
+        context.checkOutput(file);
+    if (!arguments.overlay.empty()) context.checkOutput(arguments.overlay);
+    if (!arguments.ball_photo.empty() && !(arguments.ball_radius_m > 0.0))
+        throw CLI::RequiredError("--ball-radius");
+    std::optional<Photo> photo;
+    std::vector<std::uint8_t> bytes;
+    if (!arguments.photo.empty()) {
+        photo = readPhoto(arguments.photo);
+        bytes = readFile(arguments.photo, kMaxEncodedBytes);
+    }
+    const Calibrated found = calibrate(arguments, photo);
+    context.print(found.camera.findings);
+    if (!arguments.ball_photo.empty()) printBall(arguments, found.camera, context);
+    context.print(writeCameraFile(
+        arguments.output, found.camera, arguments.photo.filename().string(), bytes));
+    if (!arguments.overlay.empty())
+        writeEncoded(arguments.overlay,
+                     drawCalibration(photo->image, found.camera, found.segments));
 }
 
 /// What the photograph itself does not tell an automatic calibration.
@@ -96,6 +194,32 @@ void addAutomaticOptions(CLI::App& command, CalibrateArguments& arguments)
         ->needs(flag);
 }
 
+/// Where a mirror ball stands in the room.
+void addBallOptions(CLI::App& command, CalibrateArguments& arguments)
+{
+    auto* picture = command.add_option("--locate-ball",
+                                       arguments.ball_photo,
+                                       "The same view with a mirror ball in it: prints where the "
+                                       "ball is in the room, with its uncertainty");
+    command.add_option("--ball-radius", arguments.ball_radius_m, "Radius of the ball, metres")
+        ->check(CLI::PositiveNumber)
+        ->needs(picture);
+    command
+        .add_option("--ball-radius-sigma",
+                    arguments.ball_radius_sigma_m,
+                    "Standard deviation of --ball-radius, metres")
+        ->check(CLI::NonNegativeNumber)
+        ->needs(picture)
+        ->capture_default_str();
+    command
+        .add_option("--ball-near",
+                    arguments.ball_near,
+                    "Where the ball is seen: x y radius, pixels, within a tenth of the radius "
+                    "[searched]")
+        ->expected(3)
+        ->needs(picture);
+}
+
 }  // namespace
 
 void registerCalibrate(CLI::App& app, Context& context)
@@ -103,10 +227,34 @@ void registerCalibrate(CLI::App& app, Context& context)
     auto arguments = std::make_shared<CalibrateArguments>();
     CLI::App* command = app.add_subcommand(
         "calibrate", "Find the camera from lines along the room's axes, marked or found");
-    command->add_option("photo", arguments->photo, "Photograph (.jpg, .png, .tif)")->required();
+    command->add_option(
+        "photo", arguments->photo, "Photograph (.jpg, .png, .tif); --from may do without");
     command->add_option("--lines", arguments->lines, "Marked lines, origin and scale (.json)");
-    command->add_option("-o,--output", arguments->output, "Camera file to write (.json)")
+    command
+        ->add_option("--from",
+                     arguments->from,
+                     "Camera of another program instead of lines: .fspy, .fspy.json, .gltf, "
+                     ".blender.json, COLMAP's cameras.txt, or ours")
+        ->excludes("--lines");
+    command
+        ->add_option("--views",
+                     arguments->views,
+                     "Several photographs of one room (.json): all their cameras in one solve, "
+                     "written into the folder -o")
+        ->excludes("photo")
+        ->excludes("--lines")
+        ->excludes("--from");
+    command->add_option("--picture", arguments->picture, "With --from cameras.txt: whose camera")
+        ->needs("--from");
+    command
+        ->add_option("-o,--output",
+                     arguments->output,
+                     "Camera to write; the name's end says how: .json, .fspy, .fspy.json, .gltf, "
+                     ".blender.json, cameras.txt")
         ->required();
+    command->add_option("--overlay",
+                        arguments->overlay,
+                        "Picture (.png, .jpg) of lines, residuals, horizon, floor grid and axes");
     command
         ->add_option("--segment-sigma-px",
                      arguments->options.segment_sigma_px,
@@ -121,11 +269,17 @@ void registerCalibrate(CLI::App& app, Context& context)
                       arguments->ignore_exif_focal,
                       "Use the lines alone where they suffice; EXIF only checks");
     addAutomaticOptions(*command, *arguments);
+    addBallOptions(*command, *arguments);
     context.addCommonOptions(*command);
     command->footer(
         "Examples:\n"
         "  insitu calibrate room.jpg --lines lines.json -o camera.json\n"
         "  insitu calibrate room.jpg --auto --camera-height 1.5 --origin 2010 1702 -o camera.json\n"
+        "  insitu calibrate room.jpg --from room.fspy -o camera.json --overlay check.png\n"
+        "  insitu calibrate room.jpg --from camera.json -o camera2.json --locate-ball "
+        "with_ball.jpg "
+        "--ball-radius 0.06\n"
+        "  insitu calibrate --views views.json -o cameras\n"
         "  insitu calibrate scan.tif --lines lines.json --focal-px 2150 -o camera.json");
     command->callback([arguments, &context] { runCalibrate(*arguments, context); });
 }

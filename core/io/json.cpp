@@ -1,6 +1,7 @@
 #include "core/io/json.h"
 
 #include "core/io/file.h"
+#include "core/io/json_bytes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -96,8 +97,13 @@ std::size_t editDistance(std::string_view a, std::string_view b)
 
 Json readJson(const std::filesystem::path& path)
 {
-    const std::string name = path.string();
-    const std::vector<std::uint8_t> bytes = readFile(path, kMaxJsonBytes);
+    return parseJson(readFile(path, kMaxJsonBytes), path.string());
+}
+
+Json parseJson(const std::vector<std::uint8_t>& bytes, const std::string& name)
+{
+    if (static_cast<std::int64_t>(bytes.size()) > kMaxJsonBytes)
+        throw InputError(name, fmt::format("holds more than {} bytes of JSON", kMaxJsonBytes));
     try {
         return Json::parse(bytes, StrictCallback(name));
     } catch (const Json::parse_error& error) {

@@ -1,5 +1,6 @@
 #include "tests/cli/json_file.h"
 #include "tests/cli/run_program.h"
+#include "tests/support/data.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -105,6 +106,89 @@ TEST_F(CalibrateSample, FindsTheRoomByItself)
     EXPECT_EQ(automatic({"--force"}).exit_code, 2);
     EXPECT_EQ(automatic({"--origin", "1", "2", "--force"}).exit_code, 2);
     EXPECT_EQ(automatic({"--auto", "--camera-height", "-1", "--force"}).exit_code, 2);
+}
+
+TEST_F(CalibrateSample, ReadsAndWritesCamerasOfOtherPrograms)
+{
+    ASSERT_EQ(calibrate().exit_code, 0);
+    const std::string plate = (kSample / "plate.jpg").string();
+    const std::string overlay = (folder_ / "overlay.png").string();
+    std::string from = camera().string();
+    for (const char* name : {"a.fspy", "a.fspy.json", "a.gltf", "a.blender.json", "cameras.txt"}) {
+        const std::string to = (folder_ / name).string();
+        const ProgramRun run = runProgram({"calibrate", plate, "--from", from, "-o", to});
+        ASSERT_EQ(run.exit_code, 0) << name << run.messages;
+        from = to;
+    }
+    const std::string last = (folder_ / "last.json").string();
+    ASSERT_EQ(runProgram({"calibrate", plate, "--from", from, "-o", last, "--overlay", overlay})
+                  .exit_code,
+              0);
+    const Json before = readJsonFile(camera());
+    const Json after = readJsonFile(last);
+    for (const char* key : {"focal_px", "position_m", "forward", "right"})
+        EXPECT_NEAR(before[key][0].get<double>(), after[key][0].get<double>(), 1e-6) << key;
+    EXPECT_GT(fs::file_size(overlay), 10000u);
+
+    EXPECT_EQ(
+        runProgram({"calibrate", "--from", from, "-o", (folder_ / "x.json").string()}).exit_code,
+        0);
+    EXPECT_EQ(runProgram({"calibrate", "--auto", "-o", (folder_ / "y.json").string()}).exit_code,
+              2);
+    EXPECT_EQ(runProgram({"calibrate", plate, "--from", from, "-o", (folder_ / "y.abc").string()})
+                  .exit_code,
+              1);
+}
+
+TEST_F(CalibrateSample, JoinsViewsIntoAFolder)
+{
+    folder_.add("lines.json", lines_.dump());
+    Json views = {
+        {"format", "insitu-views"},
+        {"version", 1},
+        {"views",
+         {{{"name", "a"}, {"image", (kSample / "plate.jpg").string()}, {"lines", "lines.json"}}}}};
+    const std::string file = folder_.add("views.json", views.dump()).string();
+    const fs::path cameras = folder_ / "cameras";
+    const ProgramRun run = runProgram({"calibrate", "--views", file, "-o", cameras.string()});
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    const Json truth = readJsonFile(kSample / "truth" / "truth.json");
+    EXPECT_NEAR(readJsonFile(cameras / "a.json")["focal_px"][0].get<double>() /
+                    truth["camera"]["fx_px"].get<double>(),
+                1.0,
+                0.01);
+    EXPECT_EQ(runProgram({"calibrate", "--views", file, "-o", cameras.string()}).exit_code, 1);
+    // A second view that shares no point with the first.
+    views["views"].push_back(views["views"][0]);
+    views["views"][1]["name"] = "b";
+    folder_.add("views.json", views.dump());
+    EXPECT_EQ(
+        runProgram({"calibrate", "--views", file, "-o", (folder_ / "two").string()}).exit_code, 3);
+}
+
+TEST_F(CalibrateSample, LocatesABallInATruthRoom)
+{
+    INSITU_NEEDS_DATA();
+    const fs::path room = dataFolder() / "truth-room-a";
+    std::vector<std::string> arguments = {"calibrate",
+                                          (room / "plate.jpg").string(),
+                                          "--lines",
+                                          (room / "lines.json").string(),
+                                          "-o",
+                                          camera().string(),
+                                          "--locate-ball",
+                                          (room / "plate_with_ball.jpg").string()};
+    EXPECT_EQ(runProgram(arguments).exit_code, 2);  // how large is it?
+    for (const char* more : {"--ball-radius", "0.06", "--ball-near", "447", "367", "12"})
+        arguments.emplace_back(more);
+    const ProgramRun run = runProgram(arguments);
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    const Json found = Json::parse(run.output);
+    // The truth is (0, 0.45, 0), 3.2 m from the camera; ± 0.2 m along the view is stated for this
+    // small ball (docs/validation.md).
+    const double expected[] = {0.0, 0.45, 0.0};
+    for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(found["center_m"][k].get<double>(), expected[k], 0.3) << k;
 }
 
 }  // namespace

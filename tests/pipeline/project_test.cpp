@@ -172,6 +172,18 @@ TEST_F(ProjectFile, OtherFormsOfCameraLightAndRoom)
     EXPECT_FALSE(project.light.probe);
 }
 
+TEST_F(ProjectFile, ProbeMayBeWhereItsOutlineSays)
+{
+    Json json = good();
+    Json& probe = json["light"]["probe"];
+    probe["center_m"] = "from-outline";
+    EXPECT_THAT(inputErrorOf([&] { (void)read(json); }), HasSubstr("light.probe.center_m"));
+    probe["view"] = "photo";
+    EXPECT_TRUE(read(json).light.probe->center_from_outline);
+    probe["center_m"] = "somewhere";
+    EXPECT_THAT(inputErrorOf([&] { (void)read(json); }), HasSubstr("from-outline"));
+}
+
 TEST_F(ProjectFile, PlacedModelStandsAndHasTheProjectsMaterial)
 {
     Json json = good();
