@@ -1,5 +1,5 @@
 # Every library the project uses, found once, as imported targets.
-find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs aruco)
 find_package(OpenEXR REQUIRED)
 find_package(glm REQUIRED)
 find_package(TBB REQUIRED)
@@ -18,5 +18,5 @@ if(INSITU_BUILD_TESTS)
 endif()
 if(INSITU_BUILD_BENCH)
   find_package(benchmark REQUIRED)
-  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs photo video)  # peers
+  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs aruco photo video)  # peers
 endif()

@@ -1,5 +1,6 @@
 #include "pipeline/probe_location.h"
 
+#include "calib/exif_focal.h"
 #include "core/check.h"
 #include "core/response_curve.h"
 
@@ -91,6 +92,46 @@ LocatedBall locateBall(const Photo& with_ball,
     result.outline = outlineIn(radiance, options, source, result.findings);
     result.place = placeBall(camera, seenBall(result.outline, radius_m, radius_sigma_m), source);
     append(result.findings, result.place.findings);
+    return result;
+}
+
+BallByBoard locateBallByBoard(const Photo& room_photo,
+                              const CameraEstimate& camera,
+                              const Photo& close_up,
+                              const MarkerBoard& board,
+                              double radius_m,
+                              double radius_sigma_m,
+                              const std::optional<BallOutline>& near,
+                              const std::string& source)
+{
+    const int width = close_up.image.codes.width();
+    const int height = close_up.image.codes.height();
+    const auto exif = focalFromExif(close_up.metadata, width, height);
+    if (!exif)
+        throw InputError(source,
+                         "the close-up has no focal length in EXIF, without which the board does "
+                         "not tell where its camera was");
+    CameraEstimate lens;
+    lens.camera =
+        Camera::lookAt(glm::dvec3(0.0), glm::dvec3(0.0, 0.0, -1.0), exif->focal_px, width, height);
+    const std::vector<BoardCorner> in_room = findBoard(room_photo.image, board);
+    const std::vector<BoardCorner> in_close = findBoard(close_up.image, board);
+    // The outline as the close-up's own camera sees it; where that is does not matter for it.
+    LocatedBall ball = locateBall(close_up, lens, radius_m, radius_sigma_m, near, source);
+    BallByBoard result;
+    result.outline = ball.outline;
+    result.location = placeByBoard(camera,
+                                   in_room,
+                                   lens.camera,
+                                   exif->sigma,
+                                   in_close,
+                                   seenBall(ball.outline, radius_m, radius_sigma_m),
+                                   source);
+    std::erase_if(ball.findings, [](const Finding& finding) {
+        return finding.code == "probe-below-floor" || finding.code == "probe-place-weak";
+    });
+    result.findings = std::move(ball.findings);
+    append(result.findings, result.location.findings);
     return result;
 }
 

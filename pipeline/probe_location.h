@@ -1,5 +1,6 @@
 #pragma once
 
+#include "calib/board_pose.h"
 #include "calib/probe_pose.h"
 #include "capture/ball_outline.h"
 #include "pipeline/project.h"
@@ -31,6 +32,25 @@ struct LocatedBall {
                                      double radius_sigma_m,
                                      const std::optional<BallOutline>& near,
                                      const std::string& source);
+
+/// The same for a close-up by any camera, when both pictures show a printed board
+/// (calib/board_pose.h): its outline is looked for in the close-up, whose focal length EXIF tells.
+/// InputError without it.
+///
+/// room_photo   the calibrated photograph, or the same view with the board in it
+struct BallByBoard {
+    BallOutline outline;     ///< in the close-up
+    BoardLocation location;  ///< the ball's place, and the close-up's camera in the room
+    Findings findings;
+};
+[[nodiscard]] BallByBoard locateBallByBoard(const Photo& room_photo,
+                                            const CameraEstimate& camera,
+                                            const Photo& close_up,
+                                            const MarkerBoard& board,
+                                            double radius_m,
+                                            double radius_sigma_m,
+                                            const std::optional<BallOutline>& near,
+                                            const std::string& source);
 
 /// Puts the probe of a project that says `"center_m": "from-outline"` where its ball's outline says
 /// it is; others are left as they are. The outline in the file counts as half a pixel uncertain.

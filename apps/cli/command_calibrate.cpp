@@ -27,6 +27,8 @@ struct CalibrateArguments {
     double ball_radius_m = 0.0;
     double ball_radius_sigma_m = 0.0;
     std::vector<double> ball_near;
+    std::vector<int> board_size;
+    MarkerBoard board;
     std::optional<double> focal_px;
     bool ignore_exif_focal = false;
     bool automatic = false;
@@ -87,7 +89,10 @@ Json listOf(glm::dvec3 v)
 }
 
 /// Where the ball stands, as JSON on stdout, in the keys of a project's probe.
-void printBall(const CalibrateArguments& arguments, const CameraEstimate& camera, Context& context)
+void printBall(const CalibrateArguments& arguments,
+               const Photo& photo,
+               const CameraEstimate& camera,
+               Context& context)
 {
     std::optional<BallOutline> near;
     if (arguments.ball_near.size() == 3) {
@@ -95,19 +100,36 @@ void printBall(const CalibrateArguments& arguments, const CameraEstimate& camera
         near->center_px = {arguments.ball_near[0], arguments.ball_near[1]};
         near->radius_px = arguments.ball_near[2];
     }
-    const LocatedBall ball = locateBall(readPhoto(arguments.ball_photo),
-                                        camera,
-                                        arguments.ball_radius_m,
-                                        arguments.ball_radius_sigma_m,
-                                        near,
-                                        arguments.ball_photo.string());
-    context.print(ball.findings);
-    const Json json = {{"center_m", listOf(ball.place.center_m)},
-                       {"center_m_sigma", listOf(ball.place.sigma_m)},
-                       {"distance_m", ball.place.distance_m},
-                       {"distance_m_sigma", ball.place.distance_sigma_m},
-                       {"center_px", {ball.outline.center_px.x, ball.outline.center_px.y}},
-                       {"radius_px", ball.outline.radius_px}};
+    const Photo picture = readPhoto(arguments.ball_photo);
+    const std::string source = arguments.ball_photo.string();
+    BallByBoard found;
+    if (arguments.board_size.empty()) {
+        LocatedBall ball = locateBall(
+            picture, camera, arguments.ball_radius_m, arguments.ball_radius_sigma_m, near, source);
+        found.outline = ball.outline;
+        found.location.ball = ball.place;
+        found.findings = std::move(ball.findings);
+    } else {
+        MarkerBoard board = arguments.board;
+        board.columns = arguments.board_size[0];
+        board.rows = arguments.board_size[1];
+        found = locateBallByBoard(photo,
+                                  camera,
+                                  picture,
+                                  board,
+                                  arguments.ball_radius_m,
+                                  arguments.ball_radius_sigma_m,
+                                  near,
+                                  source);
+    }
+    context.print(found.findings);
+    const BallPlace& place = found.location.ball;
+    Json json = {{"center_m", listOf(place.center_m)},
+                 {"center_m_sigma", listOf(place.sigma_m)},
+                 {"center_px", {found.outline.center_px.x, found.outline.center_px.y}},
+                 {"radius_px", found.outline.radius_px}};
+    if (!arguments.board_size.empty())
+        json["view"] = {{"position_m", listOf(found.location.close_up.position_m)}};
     std::cout << json.dump(2) << "\n";
 }
 
@@ -136,7 +158,8 @@ void runCalibrate(const CalibrateArguments& arguments, Context& context)
     }
     if (arguments.from.empty() && arguments.lines.empty() && !arguments.automatic)
         throw CLI::RequiredError("--lines, --auto, --from or --views");
-    if (arguments.photo.empty() && (arguments.from.empty() || !arguments.overlay.empty()))
+    if (arguments.photo.empty() &&
+        (arguments.from.empty() || !arguments.overlay.empty() || !arguments.ball_photo.empty()))
         throw CLI::RequiredError("photo");
     for (const std::filesystem::path& file : cameraFilesOf(arguments.output))
         context.checkOutput(file);
@@ -151,7 +174,7 @@ void runCalibrate(const CalibrateArguments& arguments, Context& context)
     }
     const Calibrated found = calibrate(arguments, photo);
     context.print(found.camera.findings);
-    if (!arguments.ball_photo.empty()) printBall(arguments, found.camera, context);
+    if (!arguments.ball_photo.empty()) printBall(arguments, *photo, found.camera, context);
     context.print(writeCameraFile(
         arguments.output, found.camera, arguments.photo.filename().string(), bytes));
     if (!arguments.overlay.empty())
@@ -218,6 +241,21 @@ void addBallOptions(CLI::App& command, CalibrateArguments& arguments)
                     "[searched]")
         ->expected(3)
         ->needs(picture);
+    auto* board =
+        command.add_option("--board",
+                           arguments.board_size,
+                           "Columns and rows of a printed board of ArUco markers (4x4_50) "
+                           "that both pictures show: --locate-ball may then be a close-up "
+                           "by any camera with EXIF");
+    board->expected(2)->check(CLI::Range(1, 50))->needs(picture);
+    command.add_option("--board-marker", arguments.board.marker_m, "Side of a marker, metres")
+        ->check(CLI::PositiveNumber)
+        ->needs(board)
+        ->capture_default_str();
+    command.add_option("--board-gap", arguments.board.gap_m, "Gap between markers, metres")
+        ->check(CLI::PositiveNumber)
+        ->needs(board)
+        ->capture_default_str();
 }
 
 }  // namespace

@@ -74,6 +74,23 @@ TEST(LocateBall, WhatIsNoSuchPictureIsRefused)
         HasSubstr("200x160"));
 }
 
+TEST(LocateBall, ACloseUpNeedsAFocalLengthAndTheBoard)
+{
+    const CameraEstimate camera = levelCamera(500, 400, 420.0);
+    const glm::dvec3 center(0.35, 0.9, 0.6);
+    Photo photo = ballPicture(camera.camera, center, 0.12);
+    const auto errorOf = [&] {
+        return inputErrorOf([&] {
+            (void)locateBallByBoard(
+                photo, camera, photo, MarkerBoard{}, 0.12, 0.0, std::nullopt, "close.png");
+        });
+    };
+    EXPECT_THAT(errorOf(), HasSubstr("EXIF"));
+    photo.metadata.focal_mm = 30.0;
+    photo.metadata.focal_35mm = 30.0;
+    EXPECT_THAT(errorOf(), HasSubstr("board"));
+}
+
 TEST(LocateBall, AProjectsProbeIsPlacedOnlyWhenAsked)
 {
     const CameraEstimate camera = levelCamera(500, 400, 420.0);
