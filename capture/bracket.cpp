@@ -55,22 +55,84 @@ void checkFrame(const BracketFrame& frame, const BracketFrame& first)
                  frame.excluded.height());
 }
 
-void checkMetadata(const std::vector<Exposure>& exposures,
-                   const std::vector<std::string>& cameras,
-                   Findings& findings)
+/// The same picture twice under one exposure counts once: its noise is no second measurement.
+void leaveOutRepeated(Bracket& bracket)
 {
-    const auto with_f = std::ranges::count_if(exposures, [](auto& e) { return !!e.f_number; });
-    const auto with_iso = std::ranges::count_if(exposures, [](auto& e) { return !!e.iso; });
-    const auto all = static_cast<std::ptrdiff_t>(exposures.size());
+    std::vector<BracketFrame> kept;
+    for (BracketFrame& frame : bracket.frames) {
+        const auto original = std::ranges::find_if(kept, [&](const BracketFrame& other) {
+            return other.relative_exposure == frame.relative_exposure &&
+                   other.image.max_code == frame.image.max_code &&
+                   other.image.codes == frame.image.codes;
+        });
+        if (original == kept.end()) {
+            kept.push_back(std::move(frame));
+            continue;
+        }
+        bracket.findings.push_back(
+            {Severity::Warning,
+             "bracket-repeated-picture",
+             fmt::format(
+                 "{} is the same picture as {}; it is left out", frame.name, original->name)});
+    }
+    bracket.frames = std::move(kept);
+}
+
+/// What a file of the bracket says beside its pixels.
+struct FrameFacts {
+    std::filesystem::path file;
+    double relative_exposure = 0.0;
+    PhotoMetadata metadata;
+};
+
+/// White balance is part of a RAW file's matrix and may differ; nothing else may.
+void checkColors(const FrameFacts& facts, const FrameFacts& first)
+{
+    const ColorProfile& color = facts.metadata.color;
+    const ColorProfile& expected = first.metadata.color;
+    const std::string other = first.file.filename().string();
+    if (color.transfer_is_response != expected.transfer_is_response)
+        throw InputError(facts.file.string(),
+                         fmt::format("{} RAW, unlike {}: give a bracket of RAW files or one of "
+                                     "pictures, not both",
+                                     color.transfer_is_response ? "is" : "is not",
+                                     other));
+    if (!color.transfer_is_response && !sameColors(color, expected))
+        throw InputError(facts.file.string(),
+                         fmt::format("has the colour profile '{}', {} has '{}': export all "
+                                     "exposures with the same",
+                                     color.name,
+                                     other,
+                                     expected.name));
+}
+
+void checkMetadata(const std::vector<FrameFacts>& facts, Findings& findings)
+{
+    const auto all = static_cast<std::ptrdiff_t>(facts.size());
+    const auto with_f = std::ranges::count_if(
+        facts, [](const FrameFacts& f) { return !!f.metadata.exposure.f_number; });
+    const auto with_iso =
+        std::ranges::count_if(facts, [](const FrameFacts& f) { return !!f.metadata.exposure.iso; });
     if ((with_f != 0 && with_f != all) || (with_iso != 0 && with_iso != all))
         findings.push_back({Severity::Warning,
                             "bracket-partial-exposure",
                             "f-number or ISO is known for some exposures of the bracket only; the "
                             "others count as N = 1 and ISO 100, which is hardly right: give them"});
-    if (std::ranges::any_of(cameras, [&](auto& camera) { return camera != cameras.front(); }))
+    const PhotoMetadata& first = facts.front().metadata;
+    if (std::ranges::any_of(facts, [&](const FrameFacts& f) {
+            return f.metadata.make != first.make || f.metadata.model != first.model;
+        }))
         findings.push_back({Severity::Warning,
                             "bracket-mixed-cameras",
                             "the exposures of the bracket name different cameras in EXIF"});
+    constexpr double kSameBalance = 0.01;
+    if (std::ranges::any_of(facts, [&](const FrameFacts& f) {
+            return !sameColors(f.metadata.color, first.color, kSameBalance);
+        }))
+        findings.push_back({Severity::Info,
+                            "bracket-white-balance",
+                            "the RAW files were taken with different white balances (automatic?); "
+                            "that of the longest exposure is used for all"});
 }
 
 }  // namespace
@@ -89,6 +151,8 @@ Bracket makeBracket(std::vector<BracketFrame> frames, PhotoMetadata metadata)
     std::ranges::stable_sort(bracket.frames, [](const BracketFrame& a, const BracketFrame& b) {
         return a.relative_exposure > b.relative_exposure;
     });
+
+    leaveOutRepeated(bracket);
 
     bool different = false;
     for (std::size_t i = 1; i < bracket.frames.size(); ++i) {
@@ -122,29 +186,25 @@ Bracket readBracket(const std::vector<std::filesystem::path>& files,
                  overrides.size(),
                  files.size());
     std::vector<BracketFrame> frames;
-    std::vector<Exposure> exposures;
-    std::vector<std::string> cameras;
-    PhotoMetadata first;
-    Findings told;
+    std::vector<FrameFacts> facts;
     for (std::size_t i = 0; i < files.size(); ++i) {
         Photo photo = readPhoto(files[i]);
-        // One picture of a camera speaks for all of them.
-        if (told.empty()) told = photoFindings(photo.metadata, files[i].filename().string());
-        const Exposure exposure = overrides.empty()
-                                      ? photo.metadata.exposure
-                                      : overridden(photo.metadata.exposure, overrides[i]);
+        if (!overrides.empty())
+            photo.metadata.exposure = overridden(photo.metadata.exposure, overrides[i]);
         BracketFrame frame;
         frame.name = files[i].filename().string();
-        frame.relative_exposure = requireExposure(exposure, files[i].string());
+        frame.relative_exposure = requireExposure(photo.metadata.exposure, files[i].string());
         frame.image = std::move(photo.image);
+        facts.push_back({files[i], frame.relative_exposure, std::move(photo.metadata)});
+        checkColors(facts.back(), facts.front());
         frames.push_back(std::move(frame));
-        exposures.push_back(exposure);
-        cameras.push_back(photo.metadata.make + " " + photo.metadata.model);
-        if (i == 0) first = std::move(photo.metadata);
     }
-    Bracket bracket = makeBracket(std::move(frames), std::move(first));
-    checkMetadata(exposures, cameras, bracket.findings);
-    append(bracket.findings, std::move(told));
+    Bracket bracket = makeBracket(std::move(frames));
+    checkMetadata(facts, bracket.findings);
+    // The longest speaks for all, in whatever order they were given.
+    const auto longest = std::ranges::max_element(facts, {}, &FrameFacts::relative_exposure);
+    append(bracket.findings, photoFindings(longest->metadata, longest->file.filename().string()));
+    bracket.metadata = std::move(longest->metadata);
     return bracket;
 }
 

@@ -23,15 +23,18 @@ struct BracketFrame {
 /// Exposures of one scene from one place: equal sizes, sorted from longest to shortest exposure.
 struct Bracket {
     std::vector<BracketFrame> frames;
-    PhotoMetadata metadata;  ///< of the first file: camera make and model
+    PhotoMetadata metadata;  ///< of the longest exposure: camera, and how codes stand for colour
     Findings findings;
 };
 
 /// Reads and checks a bracket. `overrides[i]` replaces what EXIF says about file i, member by
-/// member; it is empty or has one entry a file. InputError: unequal sizes, no exposure known
-/// (naming the file and the remedy), no file.
-/// Findings: "bracket-single-exposure", "bracket-duplicate-exposure", "bracket-mixed-cameras",
-/// "bracket-partial-exposure" (f-number or ISO known for some frames only), photoFindings().
+/// member; it is empty or has one entry a file. Their order does not matter. InputError: unequal
+/// sizes, no exposure known (naming the file and the remedy), no file, RAW beside other files,
+/// different colour profiles.
+/// Findings: "bracket-single-exposure", "bracket-duplicate-exposure", "bracket-repeated-picture"
+/// (the same codes twice under one exposure; the second is left out), "bracket-mixed-cameras",
+/// "bracket-partial-exposure" (f-number or ISO known for some frames only),
+/// "bracket-white-balance" (RAW: several; that of the longest exposure counts), photoFindings().
 [[nodiscard]] Bracket readBracket(const std::vector<std::filesystem::path>& files,
                                   const std::vector<Exposure>& overrides = {});
 

@@ -2,6 +2,7 @@
 
 #include "capture/alignment.h"
 #include "capture/deghost.h"
+#include "capture/exposure_check.h"
 #include "capture/hdr_merge.h"
 #include "capture/response_recovery.h"
 
@@ -32,6 +33,8 @@ struct CapturedFrame {
     double used_exposure = 0.0;     ///< corrected by what the pictures show
     double clipped_fraction = 0.0;  ///< of the pixels: some channel above the clipping limit
     double black_fraction = 0.0;    ///< of the pixels: all channels below the limit of black
+    /// What the pictures alone show, measureExposures(); nothing where they do not.
+    std::optional<double> measured_exposure = {};
 };
 
 struct CapturedRadiance {
@@ -41,13 +44,24 @@ struct CapturedRadiance {
     /// response was given or there is no inner exposure.
     double held_out_error_codes = -1.0;
     std::vector<CapturedFrame> frames;  ///< from the longest exposure to the shortest
+    double clip_fraction = 1.0;         ///< of full scale, as used
+    double black_fraction = 0.0;        ///< of full scale, as used
     MergeResult merged;
     Findings findings;  ///< of all steps, in order; those of `bracket` are not repeated
 };
 
 /// alignBracket → recoverResponse (unless `response` is given; corrects the frames' exposures) →
-/// findMovedPixels → mergeBracket.
-/// A single exposure is linearised and no more. Errors and findings as each of them.
+/// findMovedPixels → mergeBracket → Rec. 709.
+///
+/// All steps but the last work on the camera's own channels; radiance and variance then leave in
+/// Rec. 709 primaries, by the bracket's profile (metadata.color). Where no response can be
+/// recovered, the profile's curve stands in. RAW is linear: its response is known
+/// ("response-linear", Info), a response for it an InputError, and `black_fraction` counts as on a
+/// code of sRGB. Exposures are measured from the pictures: RAW takes them where `refine_exposures`
+/// allows ("capture-exposures-refined", Info); where the response is given, assumed or linear, one
+/// that is far off is a "bracket-exposure-mismatch". A single exposure is linearised and no more.
+/// Errors and findings as each of the steps, and "capture-outside-rec709" (Info): colours that Rec.
+/// 709 cannot hold were cut.
 [[nodiscard]] CapturedRadiance captureRadiance(Bracket bracket,
                                                const std::optional<ResponseCurve>& response,
                                                const CaptureOptions& options);

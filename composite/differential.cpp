@@ -107,51 +107,12 @@ std::size_t restoreClipped(const EncodedImage& photo,
     return count;
 }
 
-}  // namespace
-
-Findings CompositeOptions::validate() const
+Composite compositeInOwnPrimaries(const EncodedImage& photo,
+                                  const ResponseCurve& response,
+                                  double relative_exposure,
+                                  const RenderLayers& layers,
+                                  const CompositeOptions& options)
 {
-    Findings findings;
-    const auto demand = [&](bool holds, const char* message) {
-        if (!holds) findings.push_back({Severity::Error, "option-out-of-range", message});
-    };
-    demand(reflectance_window >= 1 && reflectance_window % 2 == 1,
-           "reflectance_window must be odd and >= 1");
-    demand(max_reflectance > 0.0 && max_reflectance <= 1.0, "max_reflectance must be in (0, 1]");
-    demand(clip_fraction > 0.5 && clip_fraction <= 1.0, "clip_fraction must be in (0.5, 1]");
-    demand(influence_codes >= 0.0, "influence_codes must be >= 0");
-    return findings;
-}
-
-Image<Rgb> photographedRadiance(const EncodedImage& photo,
-                                const ResponseCurve& response,
-                                double relative_exposure)
-{
-    INSITU_CHECK(relative_exposure > 0.0, "relative exposure {}", relative_exposure);
-    // One table look-up a channel: every code of the picture's depth once.
-    std::array<std::vector<float>, 3> table;
-    for (int c = 0; c < 3; ++c) {
-        auto& channel = table[static_cast<std::size_t>(c)];
-        channel.resize(static_cast<std::size_t>(photo.max_code) + 1);
-        for (int code = 0; code <= photo.max_code; ++code)
-            channel[static_cast<std::size_t>(code)] = static_cast<float>(
-                response.decode(c, code * 255.0 / photo.max_code) / relative_exposure);
-    }
-    Image<Rgb> radiance(photo.codes.width(), photo.codes.height());
-    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
-        const glm::u16vec3 code = photo.codes.pixels()[i];
-        radiance.pixels()[i] = {table[0][code.r], table[1][code.g], table[2][code.b]};
-    }
-    return radiance;
-}
-
-Composite compositeDifferential(const EncodedImage& photo,
-                                const ResponseCurve& response,
-                                double relative_exposure,
-                                const RenderLayers& layers,
-                                const CompositeOptions& options)
-{
-    requireValid(options.validate(), "composite options");
     INSITU_CHECK(photo.codes.sameSize(layers.object),
                  "photograph {}x{}, layers {}x{}",
                  photo.codes.width(),
@@ -219,6 +180,66 @@ Composite compositeDifferential(const EncodedImage& photo,
                  "among them: there the light probe or the bound stands for the photograph",
                  100.0 * static_cast<double>(clipped) / static_cast<double>(radiance.pixelCount()),
                  changed_clipped.load())});
+    return composite;
+}
+
+}  // namespace
+
+Findings CompositeOptions::validate() const
+{
+    Findings findings;
+    const auto demand = [&](bool holds, const char* message) {
+        if (!holds) findings.push_back({Severity::Error, "option-out-of-range", message});
+    };
+    demand(reflectance_window >= 1 && reflectance_window % 2 == 1,
+           "reflectance_window must be odd and >= 1");
+    demand(max_reflectance > 0.0 && max_reflectance <= 1.0, "max_reflectance must be in (0, 1]");
+    demand(clip_fraction > 0.5 && clip_fraction <= 1.0, "clip_fraction must be in (0.5, 1]");
+    demand(influence_codes >= 0.0, "influence_codes must be >= 0");
+    return findings;
+}
+
+Image<Rgb> photographedRadiance(const EncodedImage& photo,
+                                const ResponseCurve& response,
+                                double relative_exposure,
+                                const glm::dmat3& rec709_from_linear)
+{
+    INSITU_CHECK(relative_exposure > 0.0, "relative exposure {}", relative_exposure);
+    // One table look-up a channel: every code of the picture's depth once.
+    std::array<std::vector<float>, 3> table;
+    for (int c = 0; c < 3; ++c) {
+        auto& channel = table[static_cast<std::size_t>(c)];
+        channel.resize(static_cast<std::size_t>(photo.max_code) + 1);
+        for (int code = 0; code <= photo.max_code; ++code)
+            channel[static_cast<std::size_t>(code)] = static_cast<float>(
+                response.decode(c, code * 255.0 / photo.max_code) / relative_exposure);
+    }
+    Image<Rgb> radiance(photo.codes.width(), photo.codes.height());
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
+        const glm::u16vec3 code = photo.codes.pixels()[i];
+        radiance.pixels()[i] = {table[0][code.r], table[1][code.g], table[2][code.b]};
+    }
+    (void)convertPixels(radiance, rec709_from_linear);
+    return radiance;
+}
+
+Composite compositeDifferential(const EncodedImage& photo,
+                                const ResponseCurve& response,
+                                double relative_exposure,
+                                const RenderLayers& layers,
+                                const CompositeOptions& options,
+                                const glm::dmat3& rec709_from_linear)
+{
+    requireValid(options.validate(), "composite options");
+    if (rec709_from_linear == glm::dmat3(1.0))
+        return compositeInOwnPrimaries(photo, response, relative_exposure, layers, options);
+    const glm::dmat3 own_from_rec709 = glm::inverse(rec709_from_linear);
+    RenderLayers own = layers;
+    for (Image<Rgb>* image :
+         {&own.object, &own.irradiance_without, &own.irradiance_with, &own.probe_radiance})
+        (void)convertPixels(*image, own_from_rec709);
+    Composite composite = compositeInOwnPrimaries(photo, response, relative_exposure, own, options);
+    (void)convertPixels(composite.linear, rec709_from_linear);
     return composite;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/color_profile.h"
 #include "core/finding.h"
 #include "core/layers.h"
 #include "core/photo.h"
@@ -39,10 +40,12 @@ struct Composite {
     Findings findings;  ///< "composite-clipped-pixels"
 };
 
-/// Scene-linear radiance of a photograph: response⁻¹(code) / relative exposure.
+/// Scene-linear radiance of a photograph: response⁻¹(code) / relative exposure, brought to Rec. 709
+/// (ColorProfile::rec709_from_linear); what lies outside its primaries is cut.
 [[nodiscard]] Image<Rgb> photographedRadiance(const EncodedImage& photo,
                                               const ResponseCurve& response,
-                                              double relative_exposure);
+                                              double relative_exposure,
+                                              const glm::dmat3& rec709_from_linear = glm::dmat3(1));
 
 /// Puts the rendered layers onto the photograph.
 ///
@@ -53,10 +56,14 @@ struct Composite {
 /// same surface (layers.probe_radiance, scaled to the pixel's unclipped channels), and the channel
 /// stays clipped unless the result falls below the clipping level. Pixels outside the influence
 /// mask are the photograph's own codes.
+///
+/// All of this happens in the photograph's own primaries, into which the layers are brought (what
+/// lies outside is cut), so that codes keep their meaning; `linear` is Rec. 709 again.
 [[nodiscard]] Composite compositeDifferential(const EncodedImage& photo,
                                               const ResponseCurve& response,
                                               double relative_exposure,
                                               const RenderLayers& layers,
-                                              const CompositeOptions& options);
+                                              const CompositeOptions& options,
+                                              const glm::dmat3& rec709_from_linear = glm::dmat3(1));
 
 }  // namespace insitu

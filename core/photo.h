@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/color_profile.h"
 #include "core/exposure.h"
 #include "core/finding.h"
 #include "core/image.h"
@@ -28,8 +29,12 @@ struct PhotoMetadata {
     std::optional<double> focal_px;
     std::string make;
     std::string model;
-    int orientation = 1;             ///< as stored; pixels handed out are already upright
-    bool has_icc_profile = false;    ///< a profile was embedded (not converted yet)
+    int orientation = 1;  ///< as stored; pixels handed out are already upright
+    /// How the codes stand for colour: the embedded profile, a RAW file's own, else sRGB.
+    ColorProfile color;
+    std::string
+        icc_problem;  ///< why an embedded profile is not used; empty: it is, or there is none
+    std::vector<std::uint8_t> icc;   ///< the embedded RGB profile, to be copied into outputs
     std::vector<std::uint8_t> exif;  ///< the raw block ("Exif\0\0…"), to be copied into outputs
 };
 
@@ -39,9 +44,15 @@ struct Photo {
     PhotoMetadata metadata;
 };
 
-/// What has to be told of a photograph as read: "photo-profile-ignored" (Info) when a colour
-/// profile is embedded, which is not applied. `name` is for the message.
+/// What has to be told of a photograph as read: "photo-profile" (Info) when its colours are those
+/// of a profile other than sRGB, "photo-profile-unusable" (Warning) when the embedded one cannot be
+/// used and the codes count as sRGB. `name` is for the message.
 [[nodiscard]] Findings photoFindings(const PhotoMetadata& metadata, const std::string& name);
+
+/// A RAW photograph as a picture: 16-bit sRGB codes, white balanced, cut off where the least
+/// amplified channel saturates. Its profile then says that sRGB is the response. Others come back
+/// as they are.
+[[nodiscard]] Photo developed(Photo photo);
 
 /// Scene-linear image, Rec. 709 primaries, finite and >= 0.
 ///

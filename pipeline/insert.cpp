@@ -40,10 +40,9 @@ Exposure merged(Exposure exif, const Exposure& given)
     return exif;
 }
 
-/// The sRGB curve with the free scale of recovered ones: exposure 1 at code 128.
-ResponseCurve srgbAtMiddle()
+/// A curve with the free scale of recovered ones: exposure 1 at code 128.
+ResponseCurve scaledAtMiddle(ResponseCurve curve)
 {
-    ResponseCurve curve = ResponseCurve::srgb();
     for (auto& table : curve.exposure) {
         const double middle = table[128];
         for (double& value : table)
@@ -59,22 +58,31 @@ void choosePhotoResponse(const Project& project, InsertResult& result)
     const PhotoMetadata& probe = result.light.metadata;
     const Exposure exposure = merged(photo.exposure, project.photo.exposure);
     const bool same_camera = photo.make == probe.make && photo.model == probe.model;
-    if (result.light.response_known && same_camera) {
+    const bool both_raw = photo.color.transfer_is_response && probe.color.transfer_is_response;
+    if (photo.color.transfer_is_response) {
+        // Developed from RAW: the curve is known. Light from RAW has the same unit.
+        result.photo_response =
+            both_raw ? photo.color.transfer : scaledAtMiddle(photo.color.transfer);
+    } else if (result.light.response_known && same_camera && sameColors(photo.color, probe.color)) {
         result.photo_response = result.light.response;
     } else {
-        result.photo_response = srgbAtMiddle();
+        result.photo_response = scaledAtMiddle(photo.color.transfer);
         result.findings.push_back(
             {Severity::Warning,
              "photo-response-assumed-srgb",
-             result.light.response_known
-                 ? fmt::format("the photograph is from '{} {}', the light probe from '{} {}': the "
-                               "photograph's response is assumed to be sRGB",
+             !result.light.response_known
+                 ? fmt::format("no response was recovered for the photograph's camera: it is "
+                               "assumed to be {}",
+                               photo.color.transfer.source)
+                 : fmt::format("the photograph is from '{} {}' in '{}', the light probe from '{} "
+                               "{}' in '{}': the photograph's response is assumed to be {}",
                                photo.make,
                                photo.model,
+                               photo.color.name,
                                probe.make,
-                               probe.model)
-                 : std::string("no response was recovered for the photograph's camera: it is "
-                               "assumed to be sRGB")});
+                               probe.model,
+                               probe.color.name,
+                               photo.color.transfer.source)});
     }
     const auto relative = exposure.relative();
     if (!relative && result.light.radiance_unit_known)
@@ -272,7 +280,7 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     InsertResult result;
     Project project = given;
     Stopwatch watch(result.times);
-    result.photo = readPhoto(project.photo.path);
+    result.photo = developed(readPhoto(project.photo.path));
     append(result.findings,
            photoFindings(result.photo.metadata, project.photo.path.filename().string()));
     result.camera = solveCamera(project, result.photo, options.use_exif_focal);
@@ -293,9 +301,10 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     choosePhotoResponse(project, result);
     watch.lap("probe", from_cache);
 
+    const glm::dmat3 primaries = result.photo.metadata.color.rec709_from_linear;
     // The photograph stands in for surfaces the probe did not see, where both share a unit.
     const Image<Rgb> photo_radiance = photographedRadiance(
-        result.photo.image, result.photo_response, result.photo_relative_exposure);
+        result.photo.image, result.photo_response, result.photo_relative_exposure, primaries);
     std::optional<PhotographedRadiance> photographed;
     if (result.light.radiance_unit_known) photographed = {camera, photo_radiance};
     RenderStage stage{camera, proxy, result.light, photographed, options};
@@ -308,7 +317,8 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
                                              result.photo_response,
                                              result.photo_relative_exposure,
                                              result.render.layers,
-                                             options.composite);
+                                             options.composite,
+                                             primaries);
     append(result.findings, result.composite.findings);
     append(result.findings, cache.findings());
     watch.lap("composite");

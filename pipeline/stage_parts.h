@@ -23,14 +23,19 @@ void parts(auto& archive, PartsOf<Exposure> auto& v)
 {
     archive(v.seconds, v.f_number, v.iso);
 }
-void parts(auto& archive, PartsOf<PhotoMetadata> auto& v)
-{
-    archive(v.exposure, v.focal_mm, v.focal_35mm, v.focal_px, v.make, v.model, v.orientation);
-    archive(v.has_icc_profile, v.exif);
-}
 void parts(auto& archive, PartsOf<ResponseCurve> auto& v)
 {
     archive(v.exposure, v.source);
+}
+void parts(auto& archive, PartsOf<ColorProfile> auto& v)
+{
+    archive(v.name, v.rec709_from_linear[0], v.rec709_from_linear[1], v.rec709_from_linear[2]);
+    archive(v.transfer, v.transfer_is_response);
+}
+void parts(auto& archive, PartsOf<PhotoMetadata> auto& v)
+{
+    archive(v.exposure, v.focal_mm, v.focal_35mm, v.focal_px, v.make, v.model, v.orientation);
+    archive(v.color, v.icc_problem, v.icc, v.exif);
 }
 void parts(auto& archive, PartsOf<EnvironmentMap> auto& v)
 {

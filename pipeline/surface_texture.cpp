@@ -125,7 +125,7 @@ Texture checkerTexture(const SimulatedSurface& surface)
 
 Texture pictureTexture(const SimulatedSurface& surface)
 {
-    const Photo photo = readPhoto(surface.picture);
+    const Photo photo = developed(readPhoto(surface.picture));
     Texture texture;
     texture.texels = Image<glm::u8vec4>(photo.image.codes.width(), photo.image.codes.height());
     for (int y = 0; y < texture.texels.height(); ++y)

@@ -55,7 +55,9 @@ double secondsFromText(const std::string& text)
 
 void addBracketOptions(CLI::App& command, BracketArguments& arguments)
 {
-    command.add_option("images", arguments.images, "Exposures of one view (.jpg, .png, .tif)")
+    command
+        .add_option(
+            "images", arguments.images, "Exposures of one view (.jpg, .png, .tif, or all RAW)")
         ->required();
     command
         .add_option("--exposures",

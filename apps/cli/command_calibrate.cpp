@@ -100,7 +100,7 @@ void printBall(const CalibrateArguments& arguments,
         near->center_px = {arguments.ball_near[0], arguments.ball_near[1]};
         near->radius_px = arguments.ball_near[2];
     }
-    const Photo picture = readPhoto(arguments.ball_photo);
+    const Photo picture = developed(readPhoto(arguments.ball_photo));
     const std::string source = arguments.ball_photo.string();
     BallByBoard found;
     if (arguments.board_size.empty()) {
@@ -169,7 +169,7 @@ void runCalibrate(const CalibrateArguments& arguments, Context& context)
     std::optional<Photo> photo;
     std::vector<std::uint8_t> bytes;
     if (!arguments.photo.empty()) {
-        photo = readPhoto(arguments.photo);
+        photo = developed(readPhoto(arguments.photo));
         bytes = readFile(arguments.photo, kMaxEncodedBytes);
     }
     const Calibrated found = calibrate(arguments, photo);

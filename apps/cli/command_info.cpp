@@ -67,18 +67,15 @@ Description describePhoto(const fs::path& path)
     addIfKnown(facts, "focal_35mm", metadata.focal_35mm);
     addIfKnown(facts, "focal_px", metadata.focal_px);
     facts["orientation_as_stored"] = metadata.orientation;
-    facts["icc_profile"] = metadata.has_icc_profile;
+    facts["color_profile"] = metadata.color.name;
+    facts["raw"] = metadata.color.transfer_is_response;
     if (!metadata.exposure.seconds)
         description.findings.push_back(
             {Severity::Info,
              "info-no-exposure",
              "no exposure time in EXIF: in a bracket or a project it has to be given by hand "
              "(exposure_seconds)"});
-    if (metadata.has_icc_profile)
-        description.findings.push_back({Severity::Info,
-                                        "info-icc-profile",
-                                        "an ICC profile is embedded; it is not applied, the codes "
-                                        "count as sRGB or as the recovered response says"});
+    append(description.findings, photoFindings(metadata, path.filename().string()));
     return description;
 }
 

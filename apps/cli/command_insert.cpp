@@ -45,7 +45,10 @@ void runInsert(InsertArguments& arguments, Context& context)
     const InsertResult result = insertObjects(project, options, context.progress());
     context.print(result.findings);
 
-    writeEncoded(arguments.output, result.composite.image, result.photo.metadata.exif);
+    constexpr int kJpegQuality = 97;
+    const PhotoMetadata& metadata = result.photo.metadata;
+    writeEncoded(
+        arguments.output, result.composite.image, metadata.exif, kJpegQuality, metadata.icc);
     if (!arguments.hdr.empty()) writeRadiance(arguments.hdr, result.composite.linear);
     if (!arguments.layers.empty()) writeLayers(arguments.layers, result);
     if (!arguments.report.empty())

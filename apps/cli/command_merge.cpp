@@ -60,7 +60,7 @@ void runMerge(const MergeArguments& arguments, Context& context)
     if (!arguments.save_response.empty())
         writeJson(arguments.save_response, toJson(result.response));
     if (!arguments.report.empty()) writeCaptureReport(arguments.report, result);
-    if (!arguments.plot.empty()) writeResponsePlot(arguments.plot, result.response);
+    if (!arguments.plot.empty()) writeCapturePlot(arguments.plot, result);
 }
 
 }  // namespace
@@ -78,8 +78,10 @@ void registerMerge(CLI::App& app, Context& context)
         "--save-response", arguments->save_response, "Write the response curve (.json)");
     command->add_option("--report",
                         arguments->report,
-                        "Also write exposures, response, noise and findings (.json)");
-    command->add_option("--plot", arguments->plot, "Also draw the response curve (.svg)");
+                        "Also write exposures, response, weights, noise and findings (.json)");
+    command->add_option("--plot",
+                        arguments->plot,
+                        "Also draw response, weights, exposures, deviations and clipping (.svg)");
     context.addCommonOptions(*command);
     command->footer(
         "An .exr also holds the layers variance.R, .G, .B (of the radiance, per pixel) and "

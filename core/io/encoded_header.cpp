@@ -1,10 +1,13 @@
 #include "core/io/encoded_header.h"
 
 #include "core/io/byte_view.h"
+#include "core/io/icc_profile.h"
+#include "core/io/zlib_bytes.h"
 
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
 #include <string_view>
 
 namespace insitu {
@@ -54,6 +57,33 @@ std::size_t skipEntropyCodedData(const ByteView& file, std::size_t at)
         "the picture's data has no end marker; the file is incomplete (copy it again)");
 }
 
+/// Parts of an ICC profile by their number; each segment holds one [ICC10] annex B.4.
+class JpegProfile {
+public:
+    /// `segment` is where the length stands.
+    void add(const ByteView& file, std::size_t segment, std::size_t length)
+    {
+        constexpr std::size_t kHead = 2 + 12 + 2;  // length, name, number and count
+        if (length < kHead) return;
+        parts_[file.u8(segment + 14)] = file.slice(segment + kHead, length - kHead);
+        count_ = file.u8(segment + 15);
+    }
+
+    /// Nothing when a part is missing.
+    [[nodiscard]] std::vector<std::uint8_t> whole() const
+    {
+        std::vector<std::uint8_t> profile;
+        if (parts_.size() != count_ || parts_.empty() || parts_.begin()->first != 1) return profile;
+        for (const auto& [number, part] : parts_)
+            profile.insert(profile.end(), part.begin(), part.end());
+        return profile;
+    }
+
+private:
+    std::map<int, std::span<const std::uint8_t>> parts_;
+    std::size_t count_ = 0;
+};
+
 void readStartOfFrame(const ByteView& file, std::size_t segment, EncodedHeader& header)
 {
     header.bits = file.u8(segment + 2);
@@ -66,6 +96,7 @@ EncodedHeader parseJpeg(const ByteView& file)
 {
     EncodedHeader header;
     header.format = EncodedHeader::Format::Jpeg;
+    JpegProfile profile;
     int scans = 0;
     std::size_t at = 2;
     while (true) {
@@ -84,8 +115,10 @@ EncodedHeader parseJpeg(const ByteView& file)
             const auto block = file.slice(at + 2, length - 2);
             header.exif.assign(block.begin(), block.end());
         }
-        if (marker == 0xE2 && file.startsWith("ICC_PROFILE\0"sv, at + 2))
+        if (marker == 0xE2 && file.startsWith("ICC_PROFILE\0"sv, at + 2)) {
             header.has_icc_profile = true;
+            profile.add(file, at, length);
+        }
         at += length;
         if (marker == 0xDA) {
             if (++scans > kMaxJpegScans)
@@ -97,6 +130,7 @@ EncodedHeader parseJpeg(const ByteView& file)
         }
     }
     if (scans == 0) throw InputError(file.path(), "is a JPEG without a picture in it");
+    header.icc = profile.whole();
     return header;
 }
 
@@ -117,6 +151,15 @@ int pngChannels(int color_type)
     }
 }
 
+/// The profile of an iCCP chunk: a name, a zero, the method, a zlib stream.
+std::vector<std::uint8_t> pngProfile(std::span<const std::uint8_t> chunk)
+{
+    const auto name_end = std::ranges::find(chunk, 0);
+    const auto head = static_cast<std::size_t>(name_end - chunk.begin()) + 2;
+    if (head > chunk.size()) return {};
+    return inflated(chunk.subspan(head), kMaxIccBytes).value_or(std::vector<std::uint8_t>{});
+}
+
 EncodedHeader parsePng(const ByteView& file)
 {
     EncodedHeader header;
@@ -133,7 +176,10 @@ EncodedHeader parsePng(const ByteView& file)
     std::size_t at = 8;
     while (file.contains(at, 8)) {
         const std::size_t length = file.u32(at);
-        if (file.startsWith("iCCP"sv, at + 4)) header.has_icc_profile = true;
+        if (file.startsWith("iCCP"sv, at + 4) && !header.has_icc_profile) {
+            header.has_icc_profile = true;
+            if (file.contains(at + 8, length)) header.icc = pngProfile(file.slice(at + 8, length));
+        }
         if (file.startsWith("eXIf"sv, at + 4) && file.contains(at + 8, length)) {
             constexpr std::array<std::uint8_t, 6> kPrefix = {'E', 'x', 'i', 'f', 0, 0};
             const auto block = file.slice(at + 8, length);
@@ -161,6 +207,15 @@ std::uint32_t tiffValue(const ByteView& file, std::size_t entry)
     const std::size_t size = type == 3 ? 2 : 4;
     const std::size_t at = count * size <= 4 ? entry + 8 : file.u32(entry + 8);
     return type == 3 ? file.u16(at) : file.u32(at);
+}
+
+void readTiffProfile(const ByteView& file, std::size_t entry, EncodedHeader& header)
+{
+    const std::size_t count = file.u32(entry + 4);
+    const std::size_t at = file.u32(entry + 8);
+    if (count > kMaxIccBytes || !file.contains(at, count)) return;
+    const auto bytes = file.slice(at, count);
+    header.icc.assign(bytes.begin(), bytes.end());
 }
 
 void readTiffEntry(const ByteView& file, std::size_t entry, EncodedHeader& header, TiffTags& tags)
@@ -195,6 +250,7 @@ void readTiffEntry(const ByteView& file, std::size_t entry, EncodedHeader& heade
             break;
         case 34675:
             header.has_icc_profile = true;
+            readTiffProfile(file, entry, header);
             break;
         default:
             break;

@@ -16,6 +16,7 @@ struct EncodedHeader {
     int bits = 8;    ///< per channel
     int channels = 3;
     bool has_icc_profile = false;
+    std::vector<std::uint8_t> icc;  ///< the embedded profile; empty although there is one: damaged
     /// "Exif\0\0" and a TIFF header; empty when there is none and for a TIFF (which is one itself).
     std::vector<std::uint8_t> exif;
     /// TIFF: where the value of its orientation tag stands; 0 when it has none.

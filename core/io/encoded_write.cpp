@@ -3,10 +3,12 @@
 #include "core/io/file.h"
 #include "core/io/image_io.h"
 #include "core/io/image_path.h"
+#include "core/io/zlib_bytes.h"
 #include "core/parallel.h"
 
 #include <opencv2/imgcodecs.hpp>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <span>
@@ -15,6 +17,8 @@
 namespace insitu {
 
 namespace {
+
+using namespace std::string_view_literals;
 
 template <class Code>
 cv::Mat bgrFromRgb(const Image<glm::u16vec3>& codes)
@@ -90,33 +94,74 @@ std::span<const std::uint8_t> withoutPrefix(const Bytes& exif)
     return std::span(exif).subspan(prefixed ? kPrefixSize : 0);
 }
 
-Bytes withPngChunks(const Bytes& png, const Bytes& exif)
+/// Either the profile or the claim to be sRGB: both would contradict each other.
+Bytes pngColorChunk(const Bytes& icc)
+{
+    constexpr std::array<std::uint8_t, 1> kPerceptual = {0};
+    if (icc.empty()) return pngChunk("sRGB", kPerceptual);
+    Bytes data;
+    append(data, "ICC profile\0\0"sv);  // name, then the only method there is
+    append(data, deflated(icc));
+    return pngChunk("iCCP", data);
+}
+
+Bytes withPngChunks(const Bytes& png, const Bytes& exif, const Bytes& icc)
 {
     constexpr std::size_t kAfterHeader = 8 + 12 + 13;  // signature, then the IHDR chunk
-    constexpr std::array<std::uint8_t, 1> kPerceptual = {0};
-    Bytes chunks = pngChunk("sRGB", kPerceptual);
+    Bytes chunks = pngColorChunk(icc);
     if (!exif.empty()) append(chunks, pngChunk("eXIf", withoutPrefix(exif)));
     return withInserted(png, kAfterHeader, chunks);
 }
 
-Bytes withJpegExif(const Bytes& jpeg, const Bytes& exif)
+constexpr std::size_t kLargestSegment = 65535 - 2;
+
+/// The profile in as many segments as it needs [ICC10] annex B.4; nothing when it needs too many.
+Bytes jpegProfile(const Bytes& icc)
 {
-    constexpr std::size_t kLargestSegment = 65535 - 2;
-    if (exif.empty() || exif.size() > kLargestSegment) return jpeg;
-    Bytes segment = {0xFF, 0xE1};
-    append16(segment, static_cast<std::uint32_t>(exif.size() + 2));
-    append(segment, exif);
-    return withInserted(jpeg, 2, segment);
+    constexpr std::size_t kLargestPart = kLargestSegment - 14;  // name, number, count
+    const std::size_t count = (icc.size() + kLargestPart - 1) / kLargestPart;
+    Bytes segments;
+    if (count > 255) return segments;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t from = i * kLargestPart;
+        const auto part = std::span(icc).subspan(from, std::min(kLargestPart, icc.size() - from));
+        append(segments, "\xFF\xE2"sv);
+        append16(segments, static_cast<std::uint32_t>(part.size() + 16));
+        append(segments, "ICC_PROFILE\0"sv);
+        segments.push_back(static_cast<std::uint8_t>(i + 1));
+        segments.push_back(static_cast<std::uint8_t>(count));
+        append(segments, part);
+    }
+    return segments;
 }
 
-Bytes encodePng(const std::string& path, const EncodedImage& image, const Bytes& exif)
+Bytes withJpegSegments(const Bytes& jpeg, const Bytes& exif, const Bytes& icc)
+{
+    Bytes segments;
+    if (!exif.empty() && exif.size() <= kLargestSegment) {
+        append(segments, "\xFF\xE1"sv);
+        append16(segments, static_cast<std::uint32_t>(exif.size() + 2));
+        append(segments, exif);
+    }
+    append(segments, jpegProfile(icc));
+    return withInserted(jpeg, 2, segments);
+}
+
+Bytes encodePng(const std::string& path,
+                const EncodedImage& image,
+                const Bytes& exif,
+                const Bytes& icc)
 {
     const cv::Mat mat = image.max_code == 255 ? bgrFromRgb<std::uint8_t>(image.codes)
                                               : bgrFromRgb<std::uint16_t>(image.codes);
-    return withPngChunks(encode(path, ".png", mat, {cv::IMWRITE_PNG_COMPRESSION, 6}), exif);
+    return withPngChunks(encode(path, ".png", mat, {cv::IMWRITE_PNG_COMPRESSION, 6}), exif, icc);
 }
 
-Bytes encodeJpeg(const std::string& path, const EncodedImage& image, const Bytes& exif, int quality)
+Bytes encodeJpeg(const std::string& path,
+                 const EncodedImage& image,
+                 const Bytes& exif,
+                 const Bytes& icc,
+                 int quality)
 {
     if (image.max_code != 255)
         throw InputError(path, "a JPEG holds 8 bits; write a 16-bit image as PNG");
@@ -125,7 +170,7 @@ Bytes encodeJpeg(const std::string& path, const EncodedImage& image, const Bytes
         throw InputError(path, "a JPEG's sides are at most 65535 pixels; write a PNG");
     const Bytes jpeg = encode(
         path, ".jpg", bgrFromRgb<std::uint8_t>(image.codes), {cv::IMWRITE_JPEG_QUALITY, quality});
-    return withJpegExif(jpeg, exif);
+    return withJpegSegments(jpeg, exif, icc);
 }
 
 void checkCodes(const EncodedImage& image)
@@ -146,7 +191,8 @@ void checkCodes(const EncodedImage& image)
 void writeEncoded(const std::filesystem::path& path,
                   const EncodedImage& image,
                   const std::vector<std::uint8_t>& exif,
-                  int jpeg_quality)
+                  int jpeg_quality,
+                  const std::vector<std::uint8_t>& icc)
 {
     INSITU_CHECK(jpeg_quality >= 1 && jpeg_quality <= 100, "{}", jpeg_quality);
     checkCodes(image);
@@ -155,9 +201,9 @@ void writeEncoded(const std::filesystem::path& path,
     const Bytes upright = uprightExif(exif);
     Bytes bytes;
     if (extension == ".png")
-        bytes = encodePng(name, image, upright);
+        bytes = encodePng(name, image, upright, icc);
     else if (extension == ".jpg" || extension == ".jpeg")
-        bytes = encodeJpeg(name, image, upright, jpeg_quality);
+        bytes = encodeJpeg(name, image, upright, icc, jpeg_quality);
     else
         throw InputError(name, "pictures are written as .png, .jpg or .jpeg");
     writeBytes(path, bytes);

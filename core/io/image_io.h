@@ -23,7 +23,9 @@ inline constexpr std::int64_t kMaxPixels = 400'000'000;
 inline constexpr std::int64_t kMaxEncodedBytes = 1LL << 30;
 
 /// JPEG, PNG (8/16 bit), TIFF (8/16 bit): upright pixels (EXIF orientation applied), alpha dropped,
-/// grey expanded to RGB, with what EXIF tells. An embedded ICC profile is reported, not applied.
+/// grey expanded to RGB, with what EXIF tells. Codes stay as they are; metadata.color says what
+/// the embedded ICC profile makes of them. RAW files of cameras (what LibRaw reads): linear 16-bit
+/// codes of the sensor's channels, see core/io/raw_read.h.
 [[nodiscard]] Photo readPhoto(const std::filesystem::path& path,
                               std::int64_t max_pixels = kMaxPixels);
 /// EXR, Radiance .hdr/.pic, PFM: scene-linear. A negative value becomes 0; NaN or infinity is an
@@ -38,13 +40,15 @@ inline constexpr std::int64_t kMaxEncodedBytes = 1LL << 30;
 /// By extension: true for .exr .hdr .pic .pfm.
 [[nodiscard]] bool isRadianceFile(const std::filesystem::path& path);
 
-/// PNG 8/16 (by max_code, sRGB chunk) or JPEG (8 bit, 4:2:0, `jpeg_quality`). `exif` is copied into
-/// the file when given, its orientation set to 1 since pixels in memory are upright; a block that
-/// does not fit into a JPEG segment (65 533 bytes) is left out.
+/// PNG 8/16 (by max_code) or JPEG (8 bit, 4:2:0, `jpeg_quality`). `exif` is copied into the file
+/// when given, its orientation set to 1 since pixels in memory are upright; a block that does not
+/// fit into a JPEG segment (65 533 bytes) is left out. `icc` is embedded when given; else a PNG
+/// says that it is sRGB.
 void writeEncoded(const std::filesystem::path& path,
                   const EncodedImage& image,
                   const std::vector<std::uint8_t>& exif = {},
-                  int jpeg_quality = 97);
+                  int jpeg_quality = 97,
+                  const std::vector<std::uint8_t>& icc = {});
 /// EXR (half when `half`, then at most 65504; ZIP, chromaticities written), .hdr (RLE RGBE) or PFM.
 /// A NaN, an infinity or, in .hdr, a negative value is a LogicError: it must not leave.
 void writeRadiance(const std::filesystem::path& path, const Image<Rgb>& image, bool half = false);

@@ -1,11 +1,16 @@
+#include "core/color.h"
 #include "core/io/byte_writer.h"
 #include "core/io/encoded_header.h"
 #include "core/io/exif.h"
 #include "core/io/file.h"
+#include "core/io/icc_profile.h"
 #include "core/io/image_io.h"
+#include "core/io/raw_read.h"
 #include "core/parallel.h"
 
 #include <opencv2/imgcodecs.hpp>
+
+#include <cmath>
 
 namespace insitu {
 
@@ -82,7 +87,11 @@ PhotoMetadata readMetadata(const EncodedHeader& header, std::span<const std::uin
     const bool tiff = header.format == EncodedHeader::Format::Tiff;
     const Bytes block = tiff ? exifOfTiff(bytes) : header.exif;
     PhotoMetadata metadata = parseExif(block, header.width, header.height);
-    metadata.has_icc_profile = header.has_icc_profile;
+    if (!header.has_icc_profile) return metadata;
+    IccReading reading = readIccProfile(header.icc);
+    if (reading.profile) metadata.color = *std::move(reading.profile);
+    if (reading.rgb) metadata.icc = header.icc;
+    metadata.icc_problem = std::move(reading.problem);
     return metadata;
 }
 
@@ -90,18 +99,54 @@ PhotoMetadata readMetadata(const EncodedHeader& header, std::span<const std::uin
 
 Findings photoFindings(const PhotoMetadata& metadata, const std::string& name)
 {
-    if (!metadata.has_icc_profile) return {};
-    return {{Severity::Info,
-             "photo-profile-ignored",
-             fmt::format("{}: the embedded colour profile is not applied: colours count as sRGB's. "
-                         "If it is a wide one (Display P3), convert the pictures to sRGB first",
-                         name)}};
+    if (!metadata.icc_problem.empty())
+        return {{Severity::Warning,
+                 "photo-profile-unusable",
+                 fmt::format("{}: the embedded colour profile {}: colours count as sRGB's. Convert "
+                             "the picture to sRGB first",
+                             name,
+                             metadata.icc_problem)}};
+    if (metadata.color.hasRec709Primaries() || metadata.color.transfer_is_response) return {};
+    return {
+        {Severity::Info,
+         "photo-profile",
+         fmt::format("{}: its colours are those of the profile '{}' and are brought to Rec. 709",
+                     name,
+                     metadata.color.name)}};
+}
+
+Photo developed(Photo photo)
+{
+    ColorProfile& color = photo.metadata.color;
+    if (!color.transfer_is_response) return photo;
+    const int max_code = photo.image.max_code;
+    const glm::dmat3 matrix = color.rec709_from_linear;
+    const glm::dvec3 white = glm::min(glm::inverse(matrix) * glm::dvec3(1.0), glm::dvec3(1.0));
+    Image<glm::u16vec3>& codes = photo.image.codes;
+    parallelFor(0, codes.height(), [&](std::int64_t row) {
+        for (glm::u16vec3& code : codes.row(static_cast<int>(row))) {
+            const glm::dvec3 linear = glm::dvec3(code) / static_cast<double>(max_code);
+            const glm::dvec3 seen =
+                glm::clamp(matrix * glm::min(linear, white), glm::dvec3(0.0), glm::dvec3(1.0));
+            for (int c = 0; c < 3; ++c)
+                code[c] =
+                    static_cast<std::uint16_t>(std::lround(max_code * srgbFromLinear(seen[c])));
+        }
+    });
+    color = {};
+    color.transfer_is_response = true;
+    return photo;
 }
 
 Photo readPhoto(const std::filesystem::path& path, std::int64_t max_pixels)
 {
     const std::string name = path.string();
     std::vector<std::uint8_t> bytes = readFile(path, kMaxEncodedBytes);
+    if (isRawFile(bytes, path)) {
+        Photo raw = readRaw(bytes, path, max_pixels);
+        raw.image.codes = upright(std::move(raw.image.codes), raw.metadata.orientation);
+        return raw;
+    }
     const EncodedHeader header = parseEncodedHeader(bytes, name, max_pixels);
     Photo photo;
     photo.metadata = readMetadata(header, bytes);

@@ -19,7 +19,8 @@ EncodedImage grey(int width, int height, std::uint16_t code = 100)
 
 BracketFrame frame(const std::string& name, double exposure, int width = 4)
 {
-    return {name, grey(width, 3), exposure};
+    // No two are the same picture.
+    return {name, grey(width, 3, static_cast<std::uint16_t>(name.front())), exposure};
 }
 
 std::string messageOf(const std::function<void()>& action)
@@ -81,6 +82,19 @@ TEST(MakeBracket, ReportsSingleAndDuplicateExposures)
     const Bracket two = makeBracket({frame("a", 1.0), frame("b", 0.5), frame("c", 0.5)});
     EXPECT_FALSE(hasFinding(two.findings, "bracket-single-exposure"));
     EXPECT_TRUE(hasFinding(two.findings, "bracket-duplicate-exposure"));
+}
+
+TEST(MakeBracket, APictureThatIsThereTwiceCountsOnce)
+{
+    BracketFrame copy = frame("a", 1.0);
+    copy.name = "copy";
+    const Bracket bracket = makeBracket({frame("a", 1.0), copy, frame("b", 0.5)});
+    EXPECT_EQ(bracket.frames.size(), 2u);
+    EXPECT_TRUE(hasFinding(bracket.findings, "bracket-repeated-picture"));
+    EXPECT_FALSE(hasFinding(bracket.findings, "bracket-duplicate-exposure"));
+    // Under another exposure it is no copy: what that means, the exposures' check tells.
+    copy.relative_exposure = 0.25;
+    EXPECT_EQ(makeBracket({frame("a", 1.0), copy}).frames.size(), 2u);
 }
 
 TEST(ReadBracket, TakesExposureAndCameraFromExif)

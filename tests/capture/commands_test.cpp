@@ -175,6 +175,7 @@ TEST_F(MergeAndProbe, MergeReportsExposuresAndDrawsTheResponse)
         const double used = frame["used_exposure"];
         EXPECT_LT(used, longer);
         EXPECT_NEAR(used / frame["nominal_exposure"].get<double>(), 1.0, 0.2);
+        EXPECT_NEAR(used / frame["measured_exposure"].get<double>(), 1.0, 0.05);
         longer = used;
     }
     EXPECT_EQ(report["response"]["exposure"].size(), 3u);
@@ -182,6 +183,12 @@ TEST_F(MergeAndProbe, MergeReportsExposuresAndDrawsTheResponse)
     std::ifstream plot(file("r.svg"));
     const std::string svg((std::istreambuf_iterator<char>(plot)), {});
     EXPECT_THAT(svg, HasSubstr("<svg"));
+    EXPECT_THAT(svg, HasSubstr("frame_3.jpg"));
+    for (const char* panel : {"Response", "Weight of each", "Standard deviation", "Clipped"})
+        EXPECT_THAT(svg, HasSubstr(panel));
+    ASSERT_EQ(report["weights"].size(), 3u);
+    EXPECT_EQ(report["weights"][0]["weight"].size(), report["exposures"].size());
+    EXPECT_GT(report["deviations"].size(), 5u);
     EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
 }
 

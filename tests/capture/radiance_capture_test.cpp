@@ -1,10 +1,13 @@
 #include "capture/radiance_capture.h"
 
+#include "core/io/image_io.h"
 #include "tests/capture/synthetic_bracket.h"
+#include "tests/support/data.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace insitu {
@@ -18,8 +21,10 @@ Image<Rgb> ramp()
     Image<Rgb> image(320, 240);
     for (int y = 0; y < 240; ++y)
         for (int x = 0; x < 320; ++x)
-            image(x, y) = Rgb(1.0f, 0.9f, 0.8f) *
-                          (0.01f * std::exp2(13.0f * (static_cast<float>(x) + y / 240.0f) / 320));
+            image(x, y) =
+                Rgb(1.0f, 0.9f, 0.8f) *
+                (0.01f *
+                 std::exp2(13.0f * (static_cast<float>(x) + static_cast<float>(y) / 240.0f) / 320));
     return image;
 }
 
@@ -53,7 +58,7 @@ TEST(CaptureRadiance, GoesAllTheWay)
     EXPECT_GE(captured.held_out_error_codes, 0.0);
     ASSERT_EQ(captured.frames.size(), kOneEv.size());
     EXPECT_GT(captured.frames.front().clipped_fraction, 0.4);
-    EXPECT_GT(captured.frames.back().black_fraction, 0.3);
+    EXPECT_NEAR(captured.frames.back().black_fraction, 1.0 / 13.0, 0.02);  // a stop of thirteen
     EXPECT_EQ(captured.frames[2].used_exposure, captured.frames[2].nominal_exposure);
     EXPECT_LT(medianError(captured, ramp()), 0.01);
     EXPECT_TRUE(captured.merged.findings.empty());  // moved to the common list
@@ -86,6 +91,39 @@ TEST(CaptureRadiance, AGivenResponseIsTakenAsItIs)
     EXPECT_LT(medianError(captured, ramp()), 0.01);
 }
 
+TEST(CaptureRadiance, AGivenResponseShowsAWrongListWithItsNumbers)
+{
+    Bracket bracket = photograph(ramp(), kOneEv, camera());
+    const CapturedRadiance right = captureRadiance(bracket, tableOf(camera()), {});
+    EXPECT_FALSE(hasFinding(right.findings, "bracket-exposure-mismatch"));
+    for (const CapturedFrame& frame : right.frames) {
+        ASSERT_TRUE(frame.measured_exposure);
+        EXPECT_NEAR(*frame.measured_exposure / frame.nominal_exposure, 1.0, 0.02);  // 8-bit codes
+    }
+
+    bracket.frames[3].relative_exposure *= 1.8;
+    const CapturedRadiance wrong = captureRadiance(bracket, tableOf(camera()), {});
+    std::vector<std::string> told;
+    for (const Finding& finding : wrong.findings)
+        if (finding.code == "bracket-exposure-mismatch") told.push_back(finding.message);
+    ASSERT_EQ(told.size(), 1u);
+    EXPECT_THAT(told[0], testing::StartsWith("frame_3: given 0.225, measured 0.1"));
+    // The list is told, not changed: the response may be the one that is wrong.
+    EXPECT_EQ(wrong.frames[3].used_exposure, bracket.frames[3].relative_exposure);
+}
+
+TEST(MeasureExposures, SaysNothingWhereFramesShareNothing)
+{
+    const Bracket apart = photograph(ramp(), {1.0, 0.5, 1e-6}, camera());
+    const auto measured = measureExposures(apart, tableOf(camera()));
+    ASSERT_EQ(measured.size(), 3u);
+    EXPECT_NEAR(*measured[0] / *measured[1], 2.0, 0.02);  // 8-bit codes
+    EXPECT_FALSE(measured[2]);
+    EXPECT_TRUE(exposureMismatches(apart, measured).empty());
+    const auto alone = measureExposures(photograph(ramp(), {1.0}, camera()), tableOf(camera()));
+    EXPECT_THAT(alone, testing::ElementsAre(std::nullopt));
+}
+
 TEST(CaptureRadiance, ASingleExposureIsLinearised)
 {
     CaptureOptions options;
@@ -111,6 +149,49 @@ TEST(CaptureRadiance, WhatMovedIsLeftOut)
     EXPECT_TRUE(with.merged.validity(120, 120) & kMergeExcluded);
     const float truth = ramp()(120, 120).g;
     EXPECT_NEAR(with.merged.radiance.pixels(120, 120).g / truth, 1.0f, 0.1f);
+}
+
+/// Hand-cut crops of a ball: unequal in size and not aligned; their middles show the same.
+Bracket owlBall(const std::vector<double>& seconds)
+{
+    const auto folder = dataFolder() / "brackets" / "ball_spiceowlf_probeonly";
+    constexpr int kSide = 400;
+    std::vector<BracketFrame> frames;
+    std::size_t k = 0;
+    for (const char* name : {"0024.jpg", "0060.jpg", "0120.jpg", "0205.jpg", "0553.jpg"}) {
+        const Photo photo = readPhoto(folder / name);
+        const auto& codes = photo.image.codes;
+        const int left = (codes.width() - kSide) / 2;
+        const int top = (codes.height() - kSide) / 2;
+        BracketFrame frame;
+        frame.name = name;
+        frame.image.codes = Image<glm::u16vec3>(kSide, kSide);
+        for (int y = 0; y < kSide; ++y)
+            for (int x = 0; x < kSide; ++x)
+                frame.image.codes(x, y) = codes(left + x, top + y);
+        frame.relative_exposure =
+            seconds.empty() ? *photo.metadata.exposure.seconds : seconds.at(k);
+        frames.push_back(std::move(frame));
+        ++k;
+    }
+    return makeBracket(std::move(frames));
+}
+
+// The files are called 24, 60, 120, 205, 553; the camera wrote 1/25, 1/60, 1/125, 1/200, 1/500.
+TEST(RealBrackets, ExifCountsNotTheNamesOfTheFiles)
+{
+    INSITU_NEEDS_DATA();
+    const Bracket bracket = owlBall({});
+    const std::array written = {25.0, 60.0, 125.0, 200.0, 500.0};
+    for (std::size_t k = 0; k < written.size(); ++k)
+        EXPECT_NEAR(bracket.frames[k].relative_exposure * written[k], 1.0, 1e-6) << k;
+    const CapturedRadiance captured = captureRadiance(bracket, {}, {});
+    EXPECT_FALSE(hasFinding(captured.findings, "bracket-exposure-mismatch"));
+
+    // A list in the order of another bracket: the pictures contradict it, and by how much is told.
+    const CapturedRadiance wrong =
+        captureRadiance(owlBall({1.0 / 25, 1.0 / 125, 1.0 / 60, 1.0 / 200, 1.0 / 500}), {}, {});
+    EXPECT_TRUE(hasFinding(wrong.findings, "bracket-exposure-mismatch"));
 }
 
 }  // namespace

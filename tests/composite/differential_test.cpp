@@ -1,5 +1,6 @@
 #include "composite/differential.h"
 
+#include "core/color.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -196,6 +197,47 @@ TEST(CompositeDifferential, ALampIsNotShadowedLikeAWall)
     EXPECT_GT(
         compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}).linear(0, 0).g,
         0.9f * radiance);
+}
+
+/// Linear Rec. 709 from Display P3, column by column: SMPTE EG 432-1's primaries, both D65.
+const glm::dmat3 kRec709FromP3(
+    1.2249401, -0.0420569, -0.0196376, -0.2249404, 1.0420571, -0.0786361, 0.0, 0.0, 1.0982735);
+
+TEST(CompositeDifferential, WidePrimariesKeepEveryCodeThatIsNotTouched)
+{
+    const EncodedImage photo = rampPhoto();
+    RenderLayers layers = quietLayers(32, 24);
+    layers.irradiance_with(5, 5) *= 0.4f;
+    const Composite composite =
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}, kRec709FromP3);
+    for (int y = 0; y < 24; ++y)
+        for (int x = 0; x < 32; ++x)
+            if (x != 5 || y != 5) {
+                EXPECT_EQ(composite.image.codes(x, y), photo.codes(x, y));
+            }
+    EXPECT_LT(composite.image.codes(5, 5).g, photo.codes(5, 5).g);
+    const Image<Rgb> seen =
+        photographedRadiance(photo, ResponseCurve::srgb(), kExposure, kRec709FromP3);
+    for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(
+            composite.linear(20, 3)[c], seen(20, 3)[c], tolerance::kFloat * luminance(seen(20, 3)));
+}
+
+TEST(CompositeDifferential, ObjectsGetTheCodesOfThePhotographsPrimaries)
+{
+    const EncodedImage photo = rampPhoto(65535);
+    RenderLayers layers = quietLayers(32, 24);
+    const glm::dvec3 red(20.0, 4.0, 2.0);  // inside both
+    layers.object(5, 5) = Rgb(red);
+    layers.alpha(5, 5) = 1.0f;
+    const Composite composite =
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}, kRec709FromP3);
+    const glm::dvec3 wide = glm::inverse(kRec709FromP3) * red;
+    for (int c = 0; c < 3; ++c) {
+        const double code = ResponseCurve::srgb().encode(c, wide[c] * kExposure) * 257.0;
+        EXPECT_NEAR(composite.image.codes(5, 5)[c], code, 0.6) << c;  // rounding to a code
+        EXPECT_NEAR(composite.linear(5, 5)[c], red[c], tolerance::kFloat * red.r);
+    }
 }
 
 TEST(CompositeOptions, ValidateNamesEveryMistake)

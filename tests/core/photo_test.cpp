@@ -62,7 +62,7 @@ TEST(Photo, PngRoundTripKeepsEveryCode)
         EXPECT_EQ(photo.image.codes, image.codes);
         EXPECT_EQ(readWithOpenCv(path, cv::IMREAD_UNCHANGED), image.codes);
         EXPECT_TRUE(containsBytes(readFile(path), "sRGB"));
-        EXPECT_FALSE(photo.metadata.has_icc_profile);
+        EXPECT_TRUE(photo.metadata.icc.empty());
         EXPECT_FALSE(photo.metadata.exposure.seconds);
     }
     EXPECT_EQ(folder.size(), 1u);
@@ -282,18 +282,6 @@ TEST(Photo, TiffTellsItsExposureFromTheFarEnd)
     EXPECT_EQ(photo.metadata.orientation, 3);
     writeEncoded(folder / "a.jpg", photo.image, photo.metadata.exif);
     EXPECT_EQ(readPhoto(folder / "a.jpg").metadata.exposure.seconds, 1.0 / 60.0);
-}
-
-TEST(Photo, ProfilesAreReported)
-{
-    const TemporaryFolder folder;
-    Bytes jpeg = orientedJpeg(1);
-    const std::string_view profile("\xFF\xE2\x00\x10ICC_PROFILE\0\1\1", 18);
-    jpeg.insert(jpeg.begin() + 2, profile.begin(), profile.end());
-    const PhotoMetadata metadata = readPhoto(folder.add("a.jpg", jpeg)).metadata;
-    EXPECT_TRUE(metadata.has_icc_profile);
-    EXPECT_TRUE(hasFinding(photoFindings(metadata, "a.jpg"), "photo-profile-ignored"));
-    EXPECT_TRUE(photoFindings(PhotoMetadata{}, "a.jpg").empty());
 }
 
 TEST(Photo, RefusesWithTheCause)
