@@ -88,7 +88,7 @@ void judge(const std::filesystem::path& folder, int leave_out)
 {
     const Sun sun = readSun(folder);
     Project project = readProject(folder / "project.json");
-    auto& images = project.light.probe->images;
+    auto& images = project.light.probe->views[0].images;
     std::ranges::sort(images, std::greater<>(), [](const ProjectImage& image) {
         return readPhoto(image.path).metadata.exposure.relative().value_or(0.0);
     });

@@ -2,6 +2,7 @@
 
 #include "capture/probe_checks.h"
 #include "core/check.h"
+#include "core/io/image_io.h"
 
 #include <Eigen/Sparse>
 #include <fmt/format.h>
@@ -113,6 +114,25 @@ ProbeMask maskFromPolygons(int width,
         for (int y = first.y; y < last.y; ++y)
             for (int x = first.x; x < last.x; ++x)
                 if (insidePolygon({x + 0.5, y + 0.5}, corners)) mask(x, y) = 1;
+    }
+    return mask;
+}
+
+ProbeMask readProbeMask(const std::filesystem::path& path, int width, int height)
+{
+    const EncodedImage image = readPhoto(path).image;
+    if (image.codes.width() != width || image.codes.height() != height)
+        throw InputError(path.string(),
+                         fmt::format("{}x{} pixels; the mask must be as large as the pictures that "
+                                     "it masks, {}x{}",
+                                     image.codes.width(),
+                                     image.codes.height(),
+                                     width,
+                                     height));
+    ProbeMask mask(width, height);
+    for (std::size_t i = 0; i < mask.pixelCount(); ++i) {
+        const glm::u16vec3 code = image.codes.pixels()[i];
+        mask.pixels()[i] = 2 * std::max({code.r, code.g, code.b}) > image.max_code ? 1 : 0;
     }
     return mask;
 }

@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 namespace insitu {
@@ -18,6 +19,10 @@ using ProbeMask = Image<std::uint8_t>;
 [[nodiscard]] ProbeMask maskFromPolygons(int width,
                                          int height,
                                          const std::vector<std::vector<glm::dvec2>>& polygons_px);
+
+/// The mask that a picture shows: what is not black in it (a channel above half of full scale).
+/// InputError: unreadable, or not of the given size, that of the pictures it masks.
+[[nodiscard]] ProbeMask readProbeMask(const std::filesystem::path& path, int width, int height);
 
 /// Directions within `radius_rad` of `direction` (any length but 0).
 struct SphereCap {

@@ -182,11 +182,18 @@ CapturedLight cachedLight(const Project& project,
     if (!project.light.probe) return captureLight(project, proxy, camera, options);
     const ProjectProbe& probe = *project.light.probe;
     ContentKey key("probe");
-    key.add(probe.kind, probe.ball, probe.center_m, probe.view_position_m, probe.crop_origin_px);
-    for (const ProjectImage& image : probe.images)
-        key.add(image.path.filename().string(), image.exposure).addFile(image.path);
+    key.add(probe.kind, probe.center_m, probe.views.size());
+    bool by_photo = false;
+    for (const ProjectView& view : probe.views) {
+        key.add(view.ball, view.view_position_m, view.view_up, view.crop_origin_px);
+        key.add(view.images.size(), view.mask.has_value());
+        for (const ProjectImage& image : view.images)
+            key.add(image.path.filename().string(), image.exposure).addFile(image.path);
+        if (view.mask) key.addFile(*view.mask);
+        by_photo = by_photo || !view.view_position_m;
+    }
     if (probe.response) key.add(probe.response->filename().string()).addFile(*probe.response);
-    if (!probe.view_position_m) key.add(camera);
+    if (by_photo) key.add(camera);
     key.add(proxy.faces(), proxy.openings(), options.capture);
     if (auto kept = cache.find<CapturedLight>(key)) {
         from_cache = true;

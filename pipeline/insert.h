@@ -8,6 +8,7 @@
 #include "render/renderer.h"
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -63,7 +64,17 @@ struct InsertResult {
 [[nodiscard]] CameraEstimate solveCamera(const Project& project,
                                          const Photo& photo,
                                          bool use_exif_focal);
-/// Brackets → response → radiance → environment at the probe's centre (or the environment file).
+/// Brackets → response → radiance → environment at the probe's centre. All views take the first
+/// one's response. `photo_camera` may be absent when no view is the photograph's;
+/// `distance_to_room` as in UnwrapOptions. InputError: also a mask that is not of its pictures'
+/// size.
+[[nodiscard]] CapturedLight captureProbe(
+    const ProjectProbe& probe,
+    const Camera* photo_camera,
+    const std::function<double(glm::dvec3 origin, glm::dvec3 direction)>& distance_to_room,
+    const CaptureOptions& options,
+    int width = 0);
+/// captureProbe with the room's distances, or the environment file.
 [[nodiscard]] CapturedLight captureLight(const Project& project,
                                          const SceneProxy& proxy,
                                          const Camera& photo_camera,

@@ -140,14 +140,19 @@ Findings placeProbeFromOutline(const CameraEstimate& camera, Project& project)
     if (!project.light.probe || !project.light.probe->center_from_outline) return {};
     ProjectProbe& probe = *project.light.probe;
     BallOutline outline;
-    outline.center_px = probe.ball.center_px;
-    outline.radius_px = probe.ball.radius_px;
+    const auto view = std::ranges::find_if(
+        probe.views, [](const ProjectView& v) { return !v.view_position_m.has_value(); });
+    INSITU_CHECK(
+        view != probe.views.end(), "{}", "the ball is not seen by the photograph's camera");
+    outline.center_px = view->ball.center_px;
+    outline.radius_px = view->ball.radius_px;
     outline.center_sigma = kGivenSigma;
     outline.radius_sigma = kGivenSigma;
     BallPlace place =
-        placeBall(camera, seenBall(outline, probe.ball.radius_m, 0.0), project.file.string());
+        placeBall(camera, seenBall(outline, view->ball.radius_m, 0.0), project.file.string());
     probe.center_m = place.center_m;
-    probe.ball.center_m = place.center_m;
+    for (ProjectView& each : probe.views)
+        each.ball.center_m = place.center_m;
     project.light.center_m = place.center_m;
     Findings findings = std::move(place.findings);
     findings.push_back({Severity::Info,

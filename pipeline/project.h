@@ -20,19 +20,28 @@ struct ProjectImage {
     Exposure exposure;  ///< only what the project file gives
 };
 
-enum class ProbeKind { MirrorBall, LatLong };
+enum class ProbeKind { MirrorBall, Angular, LatLong, CubeCross };
 
-/// `light.probe`: a bracket of a light probe.
+/// One bracket of the probe, and where it was taken from.
+struct ProjectView {
+    std::vector<ProjectImage> images;
+    MirrorBall ball;  ///< mirror ball only; center_m is the probe's
+    /// Mirror ball only: its camera's place, or nothing when it is the photograph's camera.
+    std::optional<glm::dvec3> view_position_m;
+    glm::dvec3 view_up{0.0, 1.0, 0.0};  ///< upwards in the picture; for a place only
+    glm::dvec2 crop_origin_px{0.0};
+    /// A picture of the bracket's size, or nothing: what is not black in it is not used.
+    std::optional<std::filesystem::path> mask;
+};
+
+/// `light.probe`: brackets of a light probe.
 struct ProjectProbe {
     ProbeKind kind = ProbeKind::MirrorBall;
-    std::vector<ProjectImage> images;
-    MirrorBall ball;  ///< center_m is set from `center_m`
+    std::vector<ProjectView> views;  ///< one; of a mirror ball, one or several
     glm::dvec3 center_m{0.0};
-    /// `"center_m": "from-outline"`: placeProbeFromOutline (pipeline/probe_location.h) sets it.
+    /// `"center_m": "from-outline"`: placeProbeFromOutline (pipeline/probe_location.h) sets it, and
+    /// that of the views' balls.
     bool center_from_outline = false;
-    /// The camera of the ball pictures: its place, or nothing when it is the photograph's camera.
-    std::optional<glm::dvec3> view_position_m;
-    glm::dvec2 crop_origin_px{0.0};
     std::optional<std::filesystem::path> response;  ///< a saved response curve
 };
 
@@ -67,6 +76,10 @@ struct Project {
 /// ("objects[0].scale"), cause, remedy (a misspelt key gets a suggestion). Every file that the
 /// project names must exist; an object's position must lie in the room's box when there is one.
 [[nodiscard]] Project readProject(const std::filesystem::path& path);
+
+/// Reads a file that holds what `light.probe` holds, paths relative to it. InputError as
+/// readProject; also a view through the photograph's camera, which is not known here.
+[[nodiscard]] ProjectProbe readProbeFile(const std::filesystem::path& path);
 
 /// Where the object stands, given its model's mesh as loaded (the pivot needs its bounds).
 [[nodiscard]] Placement placementOf(const ProjectObject& object, const TriangleMesh& mesh);

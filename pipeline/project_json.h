@@ -34,6 +34,10 @@ namespace insitu {
 [[nodiscard]] RoomBox readBox(const JsonNode& node);
 /// `corners_m`: at least three points of a flat convex polygon.
 [[nodiscard]] std::vector<glm::dvec3> readPolygon(const JsonNode& node);
+/// A picture with its exposure: `photo`, or an entry of `images`.
+[[nodiscard]] ProjectImage readImage(const JsonNode& node, const std::filesystem::path& folder);
+/// `light.probe`.
+[[nodiscard]] ProjectProbe readProbe(const JsonNode& node, const std::filesystem::path& folder);
 /// A number in [0, 1].
 [[nodiscard]] double readFraction(const JsonNode& node);
 /// A text that must be one of `choices`; else an error that lists them.

@@ -14,6 +14,7 @@ inline const KeyList kProject = {
 inline const KeyList kImage = {"image", "exposure_seconds", "f_number", "iso"};
 inline const KeyList kCamera = {"lines", "file"};
 inline const KeyList kLight = {"probe", "environment", "center_m"};
+/// Of a probe with one view, whose keys stand beside its own, and of one with several.
 inline const KeyList kProbe = {"kind",
                                "images",
                                "exposure_seconds",
@@ -22,10 +23,14 @@ inline const KeyList kProbe = {"kind",
                                "ball",
                                "center_m",
                                "view",
+                               "mask",
+                               "views",
                                "response"};
+inline const KeyList kProbeView = {
+    "images", "exposure_seconds", "f_number", "iso", "ball", "view", "mask"};
 inline const KeyList kBall = {
     "center_px", "radius_px", "radius_m", "reflectance", "crop_origin_px"};
-inline const KeyList kView = {"position_m"};
+inline const KeyList kView = {"position_m", "up"};
 inline const KeyList kFloor = {"type", "height_m", "half_size_m"};
 inline const KeyList kPlane = {"type", "corner_m", "edge_u_m", "edge_v_m", "corners_m"};
 inline const KeyList kBox = {"type", "min_m", "max_m", "rotation_y_deg", "solid", "name"};

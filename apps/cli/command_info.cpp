@@ -194,8 +194,10 @@ Description describeProject(const fs::path& path)
     if (project.light.environment) facts["environment"] = project.light.environment->string();
     if (project.light.probe) {
         Json images = Json::array();
-        for (const ProjectImage& image : project.light.probe->images)
-            images.push_back(image.path.string());
+        for (const ProjectView& view : project.light.probe->views)
+            for (const ProjectImage& image : view.images)
+                images.push_back(image.path.string());
+        facts["probe_views"] = project.light.probe->views.size();
         facts["probe_images"] = images;
     }
     facts["room_boxes"] = project.room.boxes.size();

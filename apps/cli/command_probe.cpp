@@ -2,7 +2,9 @@
 #include "apps/cli/command.h"
 #include "capture/ball_outline.h"
 #include "capture/light_probe.h"
+#include "capture/probe_views.h"
 #include "core/io/image_io.h"
+#include "pipeline/insert.h"
 
 #include <algorithm>
 #include <array>
@@ -22,6 +24,8 @@ struct ProbeArguments {
     double reflectance = 1.0;
     std::array<double, 3> position_m = {0.0, 0.0, 0.0};
     std::optional<std::array<double, 3>> view_position_m;
+    std::array<double, 3> up = {0.0, 1.0, 0.0};
+    std::filesystem::path mask;
     int width = 0;
 };
 
@@ -99,10 +103,19 @@ LightProbe unwrapBall(const Image<Rgb>& radiance, const ProbeArguments& argument
                            fmt::format("the camera is taken to be {} m from the ball on its +z "
                                        "side; give --view-position",
                                        20.0 * ball.radius_m)});
-    const Camera camera = ballCamera(ball, view, radiance.width(), radiance.height());
-    UnwrapOptions options;
-    options.width = arguments.width;
-    LightProbe probe = unwrapMirrorBall(radiance, ball, camera, options);
+    const Camera camera =
+        ballCamera(ball, view, radiance.width(), radiance.height(), toVec3(arguments.up));
+    LightProbe probe;
+    if (arguments.mask.empty()) {
+        UnwrapOptions options;
+        options.width = arguments.width;
+        probe = unwrapMirrorBall(radiance, ball, camera, options);
+    } else {
+        MergeViewsOptions options;
+        options.width = arguments.width;
+        ProbeMask mask = readProbeMask(arguments.mask, radiance.width(), radiance.height());
+        probe = mergeProbeViews({{radiance, ball, camera, {}, std::move(mask)}}, options).probe;
+    }
     append(assumed, std::move(probe.findings));
     probe.findings = std::move(assumed);
     return probe;
@@ -114,6 +127,16 @@ void runProbe(const ProbeArguments& arguments, Context& context)
     context.checkOutput(arguments.output);
     if (!isRadianceFile(arguments.output))
         throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
+    const auto& images = arguments.bracket.images;
+    if (images.size() == 1 && images.front().extension() == ".json") {
+        const CapturedLight light = captureProbe(
+            readProbeFile(images.front()), nullptr, {}, arguments.bracket.capture, arguments.width);
+        context.print(light.findings);
+        writeRadiance(arguments.output, light.environment.pixels);
+        return;
+    }
+    if (!arguments.mask.empty() && arguments.kind != "mirror-ball")
+        throw InputError("--mask", "belongs to a mirror ball");
     const Image<Rgb> radiance = readProbeRadiance(arguments, context);
     LightProbe probe;
     if (arguments.kind == "latlong")
@@ -154,8 +177,19 @@ void addBallOptions(CLI::App& command, ProbeArguments& arguments)
     command
         .add_option("--view-position",
                     arguments.view_position_m,
-                    "Where the camera was, x,y,z in metres, Y up (default: on the +z side)")
+                    "Where the camera was, x,y,z in metres (default: on the +z side)")
         ->delimiter(',');
+    command
+        .add_option("--up",
+                    arguments.up,
+                    "Direction of the room that is upwards in the picture, x,y,z; of a camera that "
+                    "was rolled, or looked straight down")
+        ->delimiter(',')
+        ->capture_default_str();
+    command.add_option("--mask",
+                       arguments.mask,
+                       "Picture of the same size: what is not black in it (photographer, tripod) "
+                       "is not used but painted in");
 }
 
 }  // namespace
@@ -179,6 +213,7 @@ void registerProbe(CLI::App& app, Context& context)
     command->footer(
         "Examples:\n"
         "  insitu probe ball.exr -o env.exr --center 300,300 --radius 260.8\n"
+        "  insitu probe probe.json -o env.exr    (several views: docs/file_format.md, probe)\n"
         "  insitu probe ball_1.jpg ball_2.jpg ball_3.jpg -o env.exr --radius-m 0.06\n"
         "  insitu probe angular.hdr --kind angular -o env.exr --width 1024");
     command->callback([arguments, &context] { runProbe(*arguments, context); });

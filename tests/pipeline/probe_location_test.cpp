@@ -100,15 +100,17 @@ TEST(LocateBall, AProjectsProbeIsPlacedOnlyWhenAsked)
     project.light.probe.emplace();
     ProjectProbe& probe = *project.light.probe;
     probe.center_m = glm::dvec3(7.0);
-    probe.ball.center_px = outline.center_px;
-    probe.ball.radius_px = outline.radius_px;
-    probe.ball.radius_m = 0.12;
+    probe.views.emplace_back();
+    MirrorBall& ball = probe.views[0].ball;
+    ball.center_px = outline.center_px;
+    ball.radius_px = outline.radius_px;
+    ball.radius_m = 0.12;
     EXPECT_TRUE(placeProbeFromOutline(camera, project).empty());
     EXPECT_EQ(probe.center_m, glm::dvec3(7.0));
     probe.center_from_outline = true;
     EXPECT_TRUE(hasFinding(placeProbeFromOutline(camera, project), "probe-from-outline"));
     EXPECT_NEAR(glm::length(probe.center_m - center), 0.0, 1e-4);
-    EXPECT_EQ(probe.ball.center_m, probe.center_m);
+    EXPECT_EQ(ball.center_m, probe.center_m);
     EXPECT_EQ(project.light.center_m, probe.center_m);
 }
 

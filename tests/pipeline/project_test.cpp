@@ -87,15 +87,18 @@ TEST_F(ProjectFile, GoodFileIsReadWhole)
     ASSERT_TRUE(project.light.probe);
     const ProjectProbe& probe = *project.light.probe;
     EXPECT_EQ(probe.kind, ProbeKind::MirrorBall);
-    ASSERT_THAT(probe.images, SizeIs(2));
-    EXPECT_EQ(probe.images[1].path, folder_ / "ball_2.jpg");
-    EXPECT_EQ(probe.ball.center_px, glm::dvec2(300, 301));
-    EXPECT_EQ(probe.ball.radius_px, 258.1);
-    EXPECT_EQ(probe.ball.radius_m, 0.06);
-    EXPECT_EQ(probe.ball.reflectance, 0.9);
-    EXPECT_EQ(probe.ball.center_m, glm::dvec3(0, 0.45, 0.1));
+    ASSERT_THAT(probe.views, SizeIs(1));
+    const ProjectView& view = probe.views[0];
+    ASSERT_THAT(view.images, SizeIs(2));
+    EXPECT_EQ(view.images[1].path, folder_ / "ball_2.jpg");
+    EXPECT_EQ(view.ball.center_px, glm::dvec2(300, 301));
+    EXPECT_EQ(view.ball.radius_px, 258.1);
+    EXPECT_EQ(view.ball.radius_m, 0.06);
+    EXPECT_EQ(view.ball.reflectance, 0.9);
+    EXPECT_EQ(view.ball.center_m, glm::dvec3(0, 0.45, 0.1));
+    EXPECT_FALSE(view.mask);
     EXPECT_EQ(project.light.center_m, glm::dvec3(0, 0.45, 0.1));
-    EXPECT_EQ(probe.view_position_m, glm::dvec3(-0.4, 0.6, 1.1));
+    EXPECT_EQ(view.view_position_m, glm::dvec3(-0.4, 0.6, 1.1));
     ASSERT_THAT(project.room.boxes, SizeIs(1));
     EXPECT_FALSE(project.room.boxes[0].solid);
     EXPECT_EQ(project.room.boxes[0].max_m, glm::dvec3(1.9, 2.6, 3.1));
@@ -123,7 +126,7 @@ TEST_F(ProjectFile, ExposureBesideAnImageOverridesTheOneBesideTheList)
     EXPECT_EQ(project.photo.exposure.seconds, 0.04);
     EXPECT_EQ(project.photo.exposure.f_number, 5.6);
     EXPECT_EQ(project.photo.exposure.iso, 1600.0);
-    const auto& images = project.light.probe->images;
+    const auto& images = project.light.probe->views[0].images;
     EXPECT_EQ(images[0].exposure.seconds, 0.5);
     EXPECT_EQ(images[0].exposure.iso, 100.0);
     EXPECT_EQ(images[1].exposure.seconds, 0.125);
@@ -148,8 +151,8 @@ TEST_F(ProjectFile, OtherFormsOfCameraLightAndRoom)
     Project project = read(json);
     EXPECT_EQ(project.camera_file, folder_ / "camera.json");
     EXPECT_FALSE(project.camera_lines);
-    EXPECT_FALSE(project.light.probe->view_position_m);
-    EXPECT_EQ(project.light.probe->crop_origin_px, glm::dvec2(120, 80));
+    EXPECT_FALSE(project.light.probe->views[0].view_position_m);
+    EXPECT_EQ(project.light.probe->views[0].crop_origin_px, glm::dvec2(120, 80));
     EXPECT_EQ(project.light.probe->response, folder_ / "r.json");
     EXPECT_EQ(project.room.floors.at(0).height_m, 0.1);
     EXPECT_EQ(project.room.floors.at(0).half_size_m, 3.0);
@@ -316,6 +319,78 @@ TEST_F(ProjectFile, ProbeThatMakesNoSense)
     EXPECT_THAT(complaint([&](Json& j) { probe(j).erase("view"); }), HasSubstr("view"));
 }
 
+/// The good project's probe in two views.
+Json twoViews(Json json)
+{
+    Json& probe = json["light"]["probe"];
+    Json view;
+    for (const char* key : {"images", "ball", "view"}) {
+        view[key] = probe[key];
+        probe.erase(key);
+    }
+    probe["views"] = {view, view};
+    Json& second = probe["views"][1];
+    second["images"] = {"ball_2.jpg"};
+    second["exposure_seconds"] = 0.25;
+    second["mask"] = "e.exr";
+    second["view"] = {{"position_m", {0, 2.0, 0.1}}, {"up", {0, 0, -2}}};
+    return json;
+}
+
+TEST_F(ProjectFile, SeveralViewsOfABall)
+{
+    const Project project = read(twoViews(good()));
+    const std::vector<ProjectView>& views = project.light.probe->views;
+    ASSERT_THAT(views, SizeIs(2));
+    EXPECT_THAT(views[0].images, SizeIs(2));
+    EXPECT_EQ(views[0].view_up, glm::dvec3(0, 1, 0));
+    EXPECT_FALSE(views[0].mask);
+    EXPECT_EQ(views[1].images[0].exposure.seconds, 0.25);
+    EXPECT_EQ(views[1].ball.center_m, glm::dvec3(0, 0.45, 0.1));
+    EXPECT_EQ(views[1].mask, folder_ / "e.exr");
+    EXPECT_EQ(views[1].view_up, glm::dvec3(0, 0, -2));
+    for (const char* kind : {"angular", "latlong", "cube-cross"}) {
+        Json json = good();
+        Json& probe = json["light"]["probe"];
+        probe.erase("ball");
+        probe.erase("view");
+        probe["kind"] = kind;
+        EXPECT_NE(read(json).light.probe->kind, ProbeKind::MirrorBall) << kind;
+    }
+}
+
+TEST_F(ProjectFile, ViewsThatMakeNoSense)
+{
+    const auto says = [&](const std::function<void(Json&)>& change) {
+        return complaint([&](Json& j) {
+            j = twoViews(j);
+            change(j["light"]["probe"]);
+        });
+    };
+    EXPECT_THAT(says([](Json& probe) { probe["views"] = Json::array(); }), HasSubstr("empty"));
+    EXPECT_THAT(says([](Json& probe) { probe["mask"] = "e.exr"; }), HasSubstr("each of"));
+    EXPECT_THAT(says([](Json& probe) { probe["kind"] = "angular"; }), HasSubstr("mirror ball"));
+    EXPECT_THAT(says([](Json& probe) { probe["views"][1]["mask"] = "no.png"; }),
+                HasSubstr("no.png"));
+    EXPECT_THAT(says([](Json& probe) { probe["views"][1]["kind"] = "latlong"; }),
+                HasSubstr("views[1]"));
+    EXPECT_THAT(says([](Json& probe) {
+                    probe["views"][1]["view"]["up"] = {0, 0, 0};
+                }),
+                HasSubstr("no direction"));
+    EXPECT_THAT(says([](Json& probe) {
+                    probe["views"][1]["view"]["up"] = {0, 1, 0};
+                }),
+                HasSubstr("along"));
+    write("probe.json", good()["light"]["probe"].dump());
+    EXPECT_THAT(readProbeFile(folder_ / "probe.json").views, SizeIs(1));
+    Json by_photo = good()["light"]["probe"];
+    by_photo["view"] = "photo";
+    write("probe.json", by_photo.dump());
+    EXPECT_THAT(inputErrorOf([&] { (void)readProbeFile(folder_ / "probe.json"); }),
+                HasSubstr("photograph"));
+}
+
 TEST_F(ProjectFile, RoomThatMakesNoSense)
 {
     EXPECT_THAT(complaint([](Json& j) { j["room"] = Json::array(); }), HasSubstr("room"));
@@ -370,8 +445,8 @@ TEST(TruthRooms, AreReadWhole)
     for (const char* name : {"truth-room-a", "truth-room-b", "truth-room-c"}) {
         const Project project = readProject(dataFolder() / name / "project.json");
         ASSERT_TRUE(project.light.probe) << name;
-        EXPECT_THAT(project.light.probe->images, SizeIs(::testing::Ge(7u))) << name;
-        EXPECT_EQ(project.light.probe->ball.radius_px, 260.8) << name;
+        EXPECT_THAT(project.light.probe->views[0].images, SizeIs(::testing::Ge(7u))) << name;
+        EXPECT_EQ(project.light.probe->views[0].ball.radius_px, 260.8) << name;
         EXPECT_THAT(project.room.boxes, SizeIs(::testing::Ge(3u))) << name;
         EXPECT_THAT(project.room.openings, SizeIs(1)) << name;
         ASSERT_THAT(project.objects, SizeIs(1)) << name;
@@ -399,6 +474,7 @@ TEST(ProjectSchema, NamesTheParsersKeys)
                                                          {"camera", keys::kCamera},
                                                          {"light", keys::kLight},
                                                          {"probe", keys::kProbe},
+                                                         {"probe_view", keys::kProbeView},
                                                          {"ball", keys::kBall},
                                                          {"view", keys::kView},
                                                          {"floor", keys::kFloor},
