@@ -18,6 +18,7 @@ pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 if(INSITU_BUILD_TESTS)
   find_package(GTest REQUIRED)
   find_package(assimp REQUIRED)  # an independent reader to compare ours with
+  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs ximgproc)  # its guided filter
 endif()
 if(INSITU_BUILD_BENCH)
   find_package(benchmark REQUIRED)

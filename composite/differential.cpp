@@ -1,5 +1,6 @@
 #include "composite/differential.h"
 
+#include "composite/box_filter.h"
 #include "core/parallel.h"
 
 #include <algorithm>
@@ -17,33 +18,6 @@ constexpr float kPi = std::numbers::pi_v<float>;
 /// Side of the neighbourhood that tells noise from clipping, pixels: wider than JPEG's 8x8 blocks.
 constexpr int kClipWindow = 11;
 
-/// Mean over a square window (clamped at the border), separable running sums.
-Image<Rgb> boxFilter(const Image<Rgb>& image, int window)
-{
-    const int radius = window / 2;
-    const auto pass = [&](const Image<Rgb>& from, bool horizontal) {
-        Image<Rgb> to(from.width(), from.height());
-        const int lines = horizontal ? from.height() : from.width();
-        const int length = horizontal ? from.width() : from.height();
-        parallelFor(0, lines, [&](std::int64_t line) {
-            const int l = static_cast<int>(line);
-            const auto at = [&](int i) {
-                const int k = std::clamp(i, 0, length - 1);
-                return glm::dvec3(horizontal ? from(k, l) : from(l, k));
-            };
-            glm::dvec3 sum(0.0);
-            for (int i = -radius; i <= radius; ++i)
-                sum += at(i);
-            for (int i = 0; i < length; ++i) {
-                (horizontal ? to(i, l) : to(l, i)) = Rgb(sum / static_cast<double>(2 * radius + 1));
-                sum += at(i + radius + 1) - at(i - radius);
-            }
-        });
-        return to;
-    };
-    return pass(pass(image, true), false);
-}
-
 /// ρ/π of every pixel's receiver; 0 where there is none.
 Image<Rgb> reflectanceOverPi(const Image<Rgb>& photo,
                              const RenderLayers& layers,
@@ -58,8 +32,9 @@ Image<Rgb> reflectanceOverPi(const Image<Rgb>& photo,
                 if (irradiance > 0.0f)
                     result(x, y)[c] = std::min(photo(x, y)[c] / irradiance, limit);
             }
-    return options.form == CompositeForm::Difference ? boxFilter(result, options.reflectance_window)
-                                                     : result;
+    return options.form == CompositeForm::Difference
+               ? boxFilter<glm::dvec3>(result, options.reflectance_window)
+               : result;
 }
 
 /// Raises clipped channels to what the light probe knows of them; returns how many pixels had any.
@@ -77,7 +52,7 @@ std::size_t restoreClipped(const EncodedImage& photo,
     for (std::size_t i = 0; i < radiance.pixelCount(); ++i)
         for (int c = 0; c < 3; ++c)
             is_clipped.pixels()[i][c] = photo.codes.pixels()[i][c] >= clip_code ? 1.0f : 0.0f;
-    const Image<Rgb> clipped_share = boxFilter(is_clipped, kClipWindow);
+    const Image<Rgb> clipped_share = boxFilter<glm::dvec3>(is_clipped, kClipWindow);
 
     std::size_t count = 0;
     for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {

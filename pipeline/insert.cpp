@@ -5,6 +5,7 @@
 #include "core/color.h"
 #include "core/io/image_io.h"
 #include "pipeline/probe_location.h"
+#include "pipeline/radiance_mesh_stage.h"
 #include "pipeline/stage_cache.h"
 #include "pipeline/stage_parts.h"
 
@@ -204,6 +205,27 @@ CapturedLight cachedLight(const Project& project,
     return light;
 }
 
+/// A project's mark, its mask read, as coverage of the photograph.
+Image<float> foregroundOf(const ProjectForeground& foreground, const EncodedImage& photo)
+{
+    ForegroundMark mark = foreground.mark;
+    if (foreground.mask) {
+        const EncodedImage mask = readPhoto(*foreground.mask).image;
+        if (!mask.codes.sameSize(photo.codes))
+            throw InputError(foreground.mask->string(),
+                             fmt::format("is {}x{}; a mask has the photograph's size, {}x{}",
+                                         mask.codes.width(),
+                                         mask.codes.height(),
+                                         photo.codes.width(),
+                                         photo.codes.height()));
+        mark.mask = Image<float>(mask.codes.width(), mask.codes.height());
+        for (std::size_t i = 0; i < mark.mask.pixelCount(); ++i)
+            mark.mask.pixels()[i] =
+                static_cast<float>(mask.codes.pixels()[i].g) / static_cast<float>(mask.max_code);
+    }
+    return foregroundCoverage(mark, photo);
+}
+
 glm::dvec3 objectsCenter(const ObjectScene& objects)
 {
     glm::dvec3 sum(0.0);
@@ -320,6 +342,11 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     result.render = std::move(rendered.render);
     matchLightToPhoto(photo_radiance, result.light.radiance_unit_known, result);
 
+    for (const ProjectForeground& foreground : project.foreground)
+        putBehindForeground(foregroundOf(foreground, result.photo.image),
+                            foreground.mark.distance_m,
+                            photo_radiance,
+                            result.render.layers);
     result.composite = compositeDifferential(result.photo.image,
                                              result.photo_response,
                                              result.photo_relative_exposure,
@@ -330,6 +357,42 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     append(result.findings, cache.findings());
     watch.lap("composite");
     return result;
+}
+
+ProjectRadianceMesh projectRadianceMesh(const Project& given,
+                                        const InsertOptions& options,
+                                        const RadianceMeshOptions& mesh_options,
+                                        Progress& progress)
+{
+    InsertResult result;
+    Project project = given;
+    result.photo = readPhoto(project.photo.path);
+    result.camera = solveCamera(project, result.photo, options.use_exif_focal);
+    append(result.findings, result.camera.findings);
+    append(result.findings, placeProbeFromOutline(result.camera, project));
+    const SceneProxy proxy(project.room);
+    append(result.findings, proxy.findings());
+    result.light = captureLight(project, proxy, result.camera.camera, options);
+    append(result.findings, result.light.findings);
+    choosePhotoResponse(project, result);
+    std::optional<PhotographedRadiance> photographed;
+    if (result.light.radiance_unit_known)
+        photographed = {
+            result.camera.camera,
+            photographedRadiance(
+                result.photo.image, result.photo_response, result.photo_relative_exposure)};
+    RoomLightOptions light_options = options.light;
+    light_options.reference_point_m = project.objects.front().position_m;
+    const RoomLight room(proxy,
+                         result.light.environment,
+                         result.light.center_m,
+                         photographed,
+                         light_options,
+                         progress);
+    append(result.findings, room.findings());
+    return {makeRadianceMesh(
+                room, result.light.environment, result.light.center_m, photographed, mesh_options),
+            result.findings};
 }
 
 }  // namespace insitu

@@ -14,6 +14,33 @@ namespace {
 constexpr std::string_view kFormat = "insitu-project";
 constexpr int kVersion = 1;
 
+std::vector<ProjectForeground> readForeground(const JsonNode& list,
+                                              const std::filesystem::path& folder)
+{
+    std::vector<ProjectForeground> marks;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        const JsonNode node = list.at(i);
+        node.expectKeys(keys::kForeground);
+        ProjectForeground read;
+        if (node.has("polygon_px") == node.has("mask"))
+            node.fail("give either polygon_px, an outline, or mask, a picture");
+        if (const auto polygon = node.find("polygon_px")) {
+            if (polygon->size() < 3) polygon->fail("needs at least three corners");
+            for (std::size_t k = 0; k < polygon->size(); ++k)
+                read.mark.polygon_px.push_back(polygon->at(k).vec2());
+        } else {
+            read.mask = existingFile(node.at("mask"), folder);
+        }
+        if (const auto value = node.find("distance_m")) read.mark.distance_m = value->positive();
+        if (const auto value = node.find("feather_px")) read.mark.feather_px = value->number();
+        if (const auto value = node.find("refine_px")) read.mark.refine_px = value->integer();
+        for (const Finding& problem : read.mark.validate())
+            node.fail(problem.message);
+        marks.push_back(std::move(read));
+    }
+    return marks;
+}
+
 ProjectLight readLight(const JsonNode& node, const std::filesystem::path& folder)
 {
     node.expectKeys(keys::kLight);
@@ -85,7 +112,11 @@ Project readProject(const std::filesystem::path& path)
     Project project;
     project.file = std::filesystem::absolute(path).lexically_normal();
     const std::filesystem::path folder = project.file.parent_path();
-    project.photo = readImage(root.at("photo"), folder);
+    const JsonNode photo = root.at("photo");
+    photo.expectKeys(keys::kPhoto);
+    project.photo = {existingFile(photo.at("image"), folder), readExposure(photo)};
+    if (const auto foreground = photo.find("foreground"))
+        project.foreground = readForeground(*foreground, folder);
     readCamera(root.at("camera"), folder, project);
     project.light = readLight(root.at("light"), folder);
     const JsonNode objects = root.at("objects");

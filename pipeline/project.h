@@ -2,6 +2,7 @@
 
 #include "calib/camera_solve.h"
 #include "capture/light_probe.h"
+#include "composite/foreground.h"
 #include "core/finding.h"
 #include "core/mesh.h"
 #include "core/photo.h"
@@ -18,6 +19,12 @@ namespace insitu {
 struct ProjectImage {
     std::filesystem::path path;
     Exposure exposure;  ///< only what the project file gives
+};
+
+/// An entry of `photo.foreground`: what stands before the objects (composite/foreground.h).
+struct ProjectForeground {
+    ForegroundMark mark;                        ///< without its mask
+    std::optional<std::filesystem::path> mask;  ///< a picture of the photograph's size
 };
 
 enum class ProbeKind { MirrorBall, Angular, LatLong, CubeCross };
@@ -65,6 +72,7 @@ struct ProjectObject {
 struct Project {
     std::filesystem::path file;
     ProjectImage photo;
+    std::vector<ProjectForeground> foreground;
     std::optional<std::filesystem::path> camera_lines;
     std::optional<std::filesystem::path> camera_file;
     ProjectLight light;

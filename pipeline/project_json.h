@@ -34,6 +34,8 @@ namespace insitu {
 [[nodiscard]] RoomBox readBox(const JsonNode& node);
 /// `corners_m`: at least three points of a flat convex polygon.
 [[nodiscard]] std::vector<glm::dvec3> readPolygon(const JsonNode& node);
+/// `exposure_seconds`, `f_number` and `iso` beside a picture, as far as they are given.
+[[nodiscard]] Exposure readExposure(const JsonNode& node);
 /// A picture with its exposure: `photo`, or an entry of `images`.
 [[nodiscard]] ProjectImage readImage(const JsonNode& node, const std::filesystem::path& folder);
 /// `light.probe`.

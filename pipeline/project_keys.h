@@ -12,6 +12,9 @@ using KeyList = std::initializer_list<std::string_view>;
 inline const KeyList kProject = {
     "format", "version", "photo", "camera", "light", "room", "objects", "note"};
 inline const KeyList kImage = {"image", "exposure_seconds", "f_number", "iso"};
+inline const KeyList kPhoto = {"image", "exposure_seconds", "f_number", "iso", "foreground"};
+inline const KeyList kForeground = {
+    "polygon_px", "mask", "distance_m", "feather_px", "refine_px", "note"};
 inline const KeyList kCamera = {"lines", "file"};
 inline const KeyList kLight = {"probe", "environment", "center_m"};
 /// Of a probe with one view, whose keys stand beside its own, and of one with several.

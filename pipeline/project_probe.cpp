@@ -9,8 +9,6 @@
 
 namespace insitu {
 
-namespace {
-
 Exposure readExposure(const JsonNode& node)
 {
     Exposure exposure;
@@ -19,6 +17,8 @@ Exposure readExposure(const JsonNode& node)
     if (const auto value = node.find("iso")) exposure.iso = value->positive();
     return exposure;
 }
+
+namespace {
 
 /// `images` with the exposure members beside it: one time for all or a list, one an image.
 std::vector<ProjectImage> readImages(const JsonNode& probe, const std::filesystem::path& folder)

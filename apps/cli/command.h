@@ -71,6 +71,8 @@ void registerCalibrate(CLI::App& app, Context& context);
 void registerInsert(CLI::App& app, Context& context);
 void registerTonemap(CLI::App& app, Context& context);
 void registerCompare(CLI::App& app, Context& context);
+void registerReconstruct(CLI::App& app, Context& context);
+void registerMesh(CLI::App& app, Context& context);
 void registerInfo(CLI::App& app, Context& context);
 void registerSimulate(CLI::App& app, Context& context);
 

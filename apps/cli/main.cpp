@@ -19,6 +19,8 @@ constexpr RegisterCommand kCommands[] = {
     registerInsert,
     registerTonemap,
     registerCompare,
+    registerReconstruct,
+    registerMesh,
     registerInfo,
     registerSimulate,
 };

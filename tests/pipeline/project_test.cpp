@@ -471,6 +471,8 @@ TEST(ProjectSchema, NamesTheParsersKeys)
     expectSame(schema, keys::kProject, "project");
     const Json& definitions = schema.at("$defs");
     const std::pair<const char*, keys::KeyList> all[] = {{"image", keys::kImage},
+                                                         {"photo", keys::kPhoto},
+                                                         {"foreground", keys::kForeground},
                                                          {"camera", keys::kCamera},
                                                          {"light", keys::kLight},
                                                          {"probe", keys::kProbe},
