@@ -10,20 +10,20 @@
 // a pixel's place, normal and result are 36 bytes: 28 MB for 1024 x 768, 2.8 ms of one core.
 
 #include "bench/fiv_baseline.h"
+#include "bench/fiv_lights.h"
 #include "bench/fiv_report.h"
 #include "bench/fiv_stage.h"
-#include "core/color.h"
 #include "core/io/image_io.h"
 #include "core/io/model_io.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "lighting/fiv_field.h"
 #include "lighting/hidden_light.h"
+#include "lighting/staged_objects.h"
 
 #include <cstdlib>
 #include <cstring>
 #include <functional>
-#include <numeric>
 
 namespace {
 
@@ -33,7 +33,6 @@ using report::Row;
 using report::Stopwatch;
 using namespace fiv_bench;
 
-Progress silent;
 /// All of our techniques on one light against its brute force truth.
 struct Asked {
     std::string shells, plane, exact;
@@ -96,26 +95,6 @@ void compareOurs(report::Table& table,
         stage.atlas.silhouettes.memoryBytes(),
         picture,
         asked.exact);
-}
-
-/// Light as given by the texels of a cube, as in the thesis. Each is a point at its middle, so the
-/// `fine` brightest throw hard shadows of their own.
-ObjectLight litByTexels(const Stage& stage, const TexelLight& light, std::size_t fine)
-{
-    CellLight cells = light.asCellLight();
-    std::vector<std::size_t> order(light.radiance.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_sort(order, std::greater{}, [&](std::size_t k) {
-        return luminance(light.radiance[k]) * light.cells.solidAngle(k / 2);
-    });
-    for (const std::size_t k : std::span(order).first(fine)) {
-        if (light.radiance[k] == Rgb(0.0f)) break;
-        IrradianceVector& v = (k % 2 == 0 ? cells.along : cells.against)[k / 2];
-        cells.fine_directions.push_back(light.direction(k));
-        cells.fine.push_back(v);
-        v = {};
-    }
-    return lightObject(stage.mesh, stage.atlas, std::move(cells), {}, silent);
 }
 
 /// Thesis tables of some sizes beside ours on one environment.
@@ -238,26 +217,6 @@ void maskEquality(const Stage& stage)
                    100.0 * static_cast<double>(equal) / static_cast<double>(rays),
                    rays);
     }
-}
-
-/// Black but for square patches on the cube's faces.
-struct Patch {
-    glm::dvec3 direction{0.0};
-    double cosine = 0.0;  ///< of its half angle; 1: the one texel
-    Rgb radiance{0.0f};
-};
-TexelLight patches(const std::vector<Patch>& lights)
-{
-    TexelLight light{{32}, {}};
-    light.radiance.resize(2 * light.cells.pairCount(), Rgb(0.0f));
-    for (const Patch& patch : lights) {
-        const DirectedPair cell = light.cells.cellAt(patch.direction);
-        light.radiance[2 * cell.pair + static_cast<std::size_t>(cell.side)] = patch.radiance;
-        for (std::size_t k = 0; k < light.radiance.size(); ++k)
-            if (glm::dot(light.direction(k), glm::normalize(patch.direction)) > patch.cosine)
-                light.radiance[k] = patch.radiance;
-    }
-    return light;
 }
 
 /// Frames of 1024 x 768 pixels, each a floor point in the same view.
@@ -388,6 +347,55 @@ void lightBudget(report::Table& table, const Stage& stage, const EnvironmentMap&
     }
 }
 
+/// Two of the objects, one behind the other as the light sees them.
+void twoOccluders(report::Table& table, const Stage& stage, const TexelLight& light)
+{
+    const LocalFrame& local = stage.local();
+    const glm::dvec3 apart(1.2 * local.radius, 0.0, 0.3 * local.radius);
+    Placement moved;
+    moved.position_m = apart;
+    const TriangleMesh second = placed(stage.mesh, moved);
+    const TriangleMesh* const pointer = &second;
+    const RayScene second_rays(std::span<const TriangleMesh* const>(&pointer, 1));
+    const RayScene* const scenes[] = {&*stage.rays, &second_rays};
+    const Picture truth = pictureOf(stage.floor, [&](glm::dvec3 x) {
+        return baseline::bruteForce(scenes, light, x, glm::dvec3(kUp));
+    });
+    const baseline::IrradianceCube cube(light, 32);
+    const baseline::Table fivs(*stage.rays, local, light, {32, 17, 15, 0.35, 8.0});
+    const baseline::Occluder both[] = {{&fivs, local.center, local.radius},
+                                       {&fivs, local.center + apart, local.radius}};
+    const auto add = [&](const std::string& technique, double shade, const Picture& picture) {
+        table.add(
+            {"two occluders", technique, 0.0, shade, 0.0, nrmse(truth, picture), "0.005 (0.019)"});
+    };
+    for (const bool corrected : {false, true}) {
+        const Stopwatch watch;
+        const Picture picture = pictureOf(stage.floor, [&](glm::dvec3 x) {
+            return baseline::shadowed(cube, both, x, glm::dvec3(kUp), {.multiple = corrected});
+        });
+        add(corrected ? "thesis, by rays" : "thesis, not corrected",
+            watch.passed().processor,
+            picture);
+    }
+    const ObjectLight one = litByTexels(stage, light, 256);
+    const StagedObject objects[] = {{&stage.mesh, &stage.atlas, {}},
+                                    {&stage.mesh, &stage.atlas, moved}};
+    const ObjectStage pair(objects, one.light, light.cells, {}, silent);
+    std::vector<glm::dvec3> places;
+    for (const glm::ivec2 p : stage.pixels)
+        places.push_back(stage.floor.place(p.x, p.y));
+    std::vector<Rgb> hidden(places.size());
+    const Stopwatch watch;
+    pair.hiddenIrradiance(places, kUp, hidden);
+    const double shade = watch.passed().processor;
+    const Rgb free = freeIrradiance(one.light, kUp);
+    Picture picture(stage.floor.side, stage.floor.side);
+    for (std::size_t i = 0; i < hidden.size(); ++i)
+        picture(stage.pixels[i].x, stage.pixels[i].y) = free - hidden[i];
+    add("ours, exact union", shade, picture);
+}
+
 int run(const std::vector<std::string>& names, int stride)
 {
     Stage stage;
@@ -426,6 +434,7 @@ int run(const std::vector<std::string>& names, int stride)
     stage.put(stage.local().center.y - 0.6 * stage.local().radius, 0.0);
     compareTables(table, "a fifth below", stage, areas, {medium}, {{"(0.019)", "0.005", "0.005"}});
     stage.put(base, 0.0);
+    twoOccluders(table, stage, areas);
     lightBudget(table, stage, sunlit);
     frames(table, litByTexels(stage, texels, 0));
     table.write(names[3]);

@@ -72,6 +72,7 @@ void fillBlock(Group& group,
         block.ny[i] = normals[from].y;
         block.nz[i] = normals[from].z;
     }
+    std::fill(std::begin(block.uniform), std::end(block.uniform), 0.0f);
     for (auto& row : block.sums)
         std::fill(std::begin(row), std::end(row), 0.0f);
     const glm::vec3 center = 0.5f * (low + high);

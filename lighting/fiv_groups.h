@@ -28,14 +28,16 @@ void fillBlock(Group& group,
 /// What a block's sums are, by Sum.
 [[nodiscard]] inline Rgb irradianceOf(const Block& block, std::size_t i)
 {
-    return {block.sums[0][i], block.sums[1][i], block.sums[2][i]};
+    const auto sum = [&](int k) { return block.sums[k][i] + block.uniform[k]; };
+    return {sum(0), sum(1), sum(2)};
 }
 [[nodiscard]] inline IrradianceVector vectorOf(const Block& block, std::size_t i)
 {
     IrradianceVector v;
     for (int c = 0; c < 3; ++c)
         for (int axis = 0; axis < 3; ++axis)
-            v.channels[static_cast<std::size_t>(c)][axis] = block.sums[3 * c + axis][i];
+            v.channels[static_cast<std::size_t>(c)][axis] =
+                block.sums[3 * c + axis][i] + block.uniform[3 * c + axis];
     return v;
 }
 

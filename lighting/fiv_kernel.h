@@ -18,6 +18,7 @@ struct Block {
     alignas(64) Row x, y, z;     ///< local places; unused ones repeat the last
     alignas(64) Row nx, ny, nz;  ///< normals, where they are asked for
     alignas(64) Row sums[9];     ///< what comes out, channel by channel
+    float uniform[9];            ///< the same for all places, to be added to the sums
 };
 /// Blocks that are summed together: their sums stay in the second cache, a silhouette in the first.
 struct Group {

@@ -52,7 +52,30 @@ LocalFrame localFrame(const TriangleMesh& mesh)
 std::size_t SilhouetteSet::memoryBytes() const
 {
     return coverage.size() * sizeof(coverage[0]) + depths.size() * sizeof(depths[0]) +
-           frames.size() * sizeof(frames[0]) + directions.size() * sizeof(directions[0]);
+           frames.size() * sizeof(frames[0]) + directions.size() * sizeof(directions[0]) +
+           tiles.size() * sizeof(tiles[0]);
+}
+
+void SilhouetteSet::summarize()
+{
+    tiles.assign(frames.size(), {});
+    const int side = SilhouetteTiles::texels(resolution);
+    parallelFor(0, static_cast<std::int64_t>(frames.size()), [&](std::int64_t task) {
+        const auto i = static_cast<std::size_t>(task);
+        const std::uint8_t* texel = coverageOf(i);
+        std::array<std::uint16_t, SilhouetteTiles::kSide> partly{}, touched{};
+        for (int y = 0; y < resolution; ++y)
+            for (int x = 0; x < resolution; ++x, ++texel) {
+                const auto row = static_cast<std::size_t>(y / side);
+                const auto bit = static_cast<std::uint16_t>(1u << (x / side));
+                if (*texel != 255) partly[row] = static_cast<std::uint16_t>(partly[row] | bit);
+                if (*texel != 0) touched[row] = static_cast<std::uint16_t>(touched[row] | bit);
+            }
+        for (std::size_t row = 0; row < SilhouetteTiles::kSide; ++row) {
+            tiles[i].full[row] = static_cast<std::uint16_t>(~partly[row]);
+            tiles[i].empty[row] = static_cast<std::uint16_t>(~touched[row]);
+        }
+    });
 }
 
 SilhouetteSet drawSilhouettes(const TriangleMesh& mesh,
@@ -92,6 +115,7 @@ SilhouetteSet drawSilhouettes(const TriangleMesh& mesh,
         const std::lock_guard lock(reporting);
         progress.report("silhouettes", static_cast<double>(++done) / static_cast<double>(chunks));
     });
+    set.summarize();
     return set;
 }
 

@@ -5,6 +5,7 @@
 
 #include <glm/glm.hpp>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -50,6 +51,16 @@ struct DepthSpan {
 inline constexpr float kMinDepthCode = 1.0f;
 inline constexpr float kMaxDepthCode = 65534.0f;
 
+/// Which parts of a silhouette are wholly covered and which wholly empty: most places fall into
+/// neither's neighbourhood and need no texel looked at. 16 x 16 tiles, bit x of row y.
+struct SilhouetteTiles {
+    static constexpr int kSide = 16;
+
+    std::array<std::uint16_t, kSide> full{}, empty{};
+    /// Texels along a tile's side.
+    [[nodiscard]] static int texels(int resolution) { return (resolution + kSide - 1) / kSide; }
+};
+
 /// Orthographic silhouettes of one object along several directions.
 ///
 /// A place x is hidden from the light of direction ω (which points to the light) when the ray from
@@ -64,7 +75,10 @@ struct SilhouetteSet {
     /// resolution² a direction, row by row: share of the texel that the object covers, 255 is all.
     std::vector<std::uint8_t> coverage;
     std::vector<DepthSpan> depths;
+    std::vector<SilhouetteTiles> tiles;  ///< one a direction, from the coverage
 
+    /// Makes the tiles from the coverage.
+    void summarize();
     [[nodiscard]] std::size_t texels() const
     {
         return static_cast<std::size_t>(resolution) * static_cast<std::size_t>(resolution);

@@ -144,6 +144,7 @@ std::optional<VisibilityAtlas> atlasFromBytes(const std::vector<std::uint8_t>& b
         std::memcpy(data, from, count);
         from += count;
     });
+    set.summarize();
     return atlas;
 }
 
