@@ -168,9 +168,9 @@ TEST_F(SimulateRoom, WhatIsWrittenIsAProject)
     const Project project = readProject(out / "project.json");
     EXPECT_EQ(project.photo.path, out / "plate.jpg");
     ASSERT_TRUE(project.light.probe);
-    EXPECT_THAT(project.light.probe->images, SizeIs(2));
-    EXPECT_EQ(project.light.probe->view_position_m, room.ball_view_m);
-    EXPECT_EQ(project.light.probe->ball.radius_px, room.ball.radius_px);
+    EXPECT_THAT(project.light.probe->views[0].images, SizeIs(2));
+    EXPECT_EQ(project.light.probe->views[0].view_position_m, room.ball_view_m);
+    EXPECT_EQ(project.light.probe->views[0].ball.radius_px, room.ball.radius_px);
     ASSERT_THAT(project.room.boxes, SizeIs(3));  // room, crate, tent
     EXPECT_EQ(project.room.boxes[1].name, "crate");
     EXPECT_TRUE(project.room.boxes[2].solid);
@@ -185,7 +185,7 @@ TEST_F(SimulateRoom, WhatIsWrittenIsAProject)
     EXPECT_EQ(lines.camera_height_m, 1.4);
     EXPECT_EQ(lines.segments.size(), capture.edges.size());
 
-    const Photo ball = readPhoto(project.light.probe->images[1].path);
+    const Photo ball = readPhoto(project.light.probe->views[0].images[1].path);
     EXPECT_NEAR(ball.metadata.exposure.seconds.value(), 0.03125, 1e-9);
     for (const char* name : {"truth.jpg",
                              "truth_linear.exr",
