@@ -30,8 +30,8 @@ void measure(const std::filesystem::path& folder)
         RadianceMeshOptions mesh_options;
         mesh_options.patch_m = patch_m;
         const auto start = std::chrono::steady_clock::now();
-        const RadianceMesh mesh = makeRadianceMesh(
-            room, light.center_m, light.environment.pixels.height(), std::nullopt, mesh_options);
+        const RadianceMesh mesh =
+            makeRadianceMesh(room, light.environment, light.center_m, std::nullopt, mesh_options);
         const double seconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         fmt::print("{} {:.1f} m: {} patches in {:.2f} s; irradiance off by",
