@@ -36,8 +36,8 @@ double greyAt(const Image<float>& grey, glm::dvec2 at)
 /// Change of grey per pixel across the segment at an offset.
 double slopeAt(const Image<float>& grey, glm::dvec2 at, glm::dvec2 normal, double offset)
 {
-    return 0.5 *
-           (greyAt(grey, at + normal * (offset + 1.0)) - greyAt(grey, at + normal * (offset - 1.0)));
+    return 0.5 * (greyAt(grey, at + normal * (offset + 1.0)) -
+                  greyAt(grey, at + normal * (offset - 1.0)));
 }
 
 /// The middle of the change about its steepest place: unlike the vertex of a parabola, the middle
