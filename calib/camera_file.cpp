@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace insitu {
@@ -41,12 +42,13 @@ void settleAxes(const JsonNode& root, Camera& camera)
 }
 
 /// {"division": λ}, or the empty list (zeros, null) of other programs for none.
-double readDistortion(const JsonNode& root)
+double readDistortion(const JsonNode& root, double& sigma)
 {
     const auto distortion = root.find("distortion");
     if (!distortion || distortion->value().is_null()) return 0.0;
     if (distortion->value().is_object()) {
-        distortion->expectKeys({"division"});
+        distortion->expectKeys({"division", "division_sigma"});
+        if (const auto node = distortion->find("division_sigma")) sigma = node->number();
         const JsonNode node = distortion->at("division");
         const double division = node.number();
         if (std::abs(division) > kMaxDivision)
@@ -59,10 +61,37 @@ double readDistortion(const JsonNode& root)
     return 0.0;
 }
 
-Json distortionJson(const Camera& camera)
+Json distortionJson(const CameraEstimate& estimate)
 {
-    if (camera.division == 0.0) return Json::array();
-    return {{"division", camera.division}};
+    const double division = estimate.camera.division;
+    if (division == 0.0 && estimate.division_sigma == 0.0) return Json::array();
+    return {{"division", division}, {"division_sigma", estimate.division_sigma}};
+}
+
+/// Nothing when something is open (infinite) or nothing is known.
+std::optional<Json> covarianceJson(const CameraCovariance& covariance)
+{
+    Json rows = Json::array();
+    bool known = false;
+    for (const auto& row : covariance) {
+        rows.push_back(row);
+        for (const double value : row) {
+            if (!std::isfinite(value)) return std::nullopt;
+            known = known || value != 0.0;
+        }
+    }
+    return known ? std::optional<Json>(rows) : std::nullopt;
+}
+
+void readCovariance(const JsonNode& node, CameraCovariance& covariance)
+{
+    if (node.size() != covariance.size()) node.fail("needs 10 rows of 10 numbers");
+    for (std::size_t i = 0; i < covariance.size(); ++i) {
+        const JsonNode row = node.at(i);
+        if (row.size() != covariance.size()) row.fail("needs 10 numbers");
+        for (std::size_t j = 0; j < covariance.size(); ++j)
+            covariance[i][j] = row.at(j).number();
+    }
 }
 
 void readDoubts(const JsonNode& root, CameraEstimate& estimate)
@@ -71,7 +100,16 @@ void readDoubts(const JsonNode& root, CameraEstimate& estimate)
         estimate.focal_sigma_px = node->value().is_array() ? node->vec2().x : node->number();
     if (const auto node = root.find("rotation_sigma_deg"))
         estimate.rotation_sigma_rad = glm::radians(node->number());
+    if (const auto node = root.find("turn_sigma_deg"))
+        estimate.turn_sigma_rad = glm::radians(node->vec3());
+    if (const auto node = root.find("principal_point_px_sigma"))
+        estimate.principal_sigma_px = node->vec2();
     if (const auto node = root.find("position_m_sigma")) estimate.position_sigma_m = node->vec3();
+    if (const auto node = root.find("covariance")) readCovariance(*node, estimate.covariance);
+    if (const auto node = root.find("outlier_segments"))
+        for (std::size_t i = 0; i < node->size(); ++i)
+            estimate.outlier_segments.push_back(
+                static_cast<std::size_t>(std::max(0, node->at(i).integer())));
     if (const auto node = root.find("residual_rms_px")) estimate.residual_rms_px = node->number();
     if (const auto node = root.find("vanishing_points_px")) {
         node->expectKeys({"x", "y", "z"});
@@ -99,18 +137,23 @@ void writeCamera(const std::filesystem::path& path, const CameraEstimate& estima
     json["focal_px"] = toJson(camera.focal_px);
     json["focal_px_sigma"] = toJson(glm::dvec2(estimate.focal_sigma_px));
     json["principal_point_px"] = toJson(camera.principal_px);
-    json["distortion"] = distortionJson(camera);
+    json["principal_point_px_sigma"] = toJson(estimate.principal_sigma_px);
+    json["distortion"] = distortionJson(estimate);
     json["position_m"] = toJson(camera.position_m);
     json["position_m_sigma"] = toJson(estimate.position_sigma_m);
     json["right"] = toJson(camera.right);
     json["up"] = toJson(camera.up);
     json["forward"] = toJson(camera.forward);
     json["rotation_sigma_deg"] = glm::degrees(estimate.rotation_sigma_rad);
+    json["turn_sigma_deg"] = toJson(glm::degrees(estimate.turn_sigma_rad));
+    if (const auto covariance = covarianceJson(estimate.covariance))
+        json["covariance"] = *covariance;
     json["residual_rms_px"] = estimate.residual_rms_px;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto& point = estimate.vanishing_points_px[axis];
         json["vanishing_points_px"][kAxisNames[axis]] = point ? toJson(*point) : Json();
     }
+    json["outlier_segments"] = estimate.outlier_segments;
     json["findings"] = toJson(estimate.findings);
     writeJson(path, json);
 }
@@ -123,6 +166,7 @@ CameraEstimate readCamera(const std::filesystem::path& path)
                      "focal_px",
                      "focal_px_sigma",
                      "principal_point_px",
+                     "principal_point_px_sigma",
                      "distortion",
                      "position_m",
                      "position_m_sigma",
@@ -130,8 +174,11 @@ CameraEstimate readCamera(const std::filesystem::path& path)
                      "up",
                      "forward",
                      "rotation_sigma_deg",
+                     "turn_sigma_deg",
+                     "covariance",
                      "residual_rms_px",
                      "vanishing_points_px",
+                     "outlier_segments",
                      "findings",
                      "note"});
     CameraEstimate estimate;
@@ -147,7 +194,7 @@ CameraEstimate readCamera(const std::filesystem::path& path)
     camera.principal_px = glm::dvec2(camera.width, camera.height) * 0.5;
     if (const auto principal = root.find("principal_point_px"))
         camera.principal_px = principal->vec2();
-    camera.division = readDistortion(root);
+    camera.division = readDistortion(root, estimate.division_sigma);
     camera.position_m = root.at("position_m").vec3();
     camera.right = root.at("right").vec3();
     camera.up = root.at("up").vec3();

@@ -1,12 +1,11 @@
 #include "calib/camera_solve.h"
 
-#include "calib/lens_distortion.h"
-#include "calib/metric_scale.h"
-#include "calib/orientation.h"
+#include "calib/camera_findings.h"
+#include "calib/camera_fit.h"
+#include "calib/camera_start.h"
 #include "core/check.h"
 
 #include <fmt/format.h>
-#include <glm/gtc/constants.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -15,34 +14,27 @@ namespace insitu {
 
 namespace {
 
+using calibration::Choice;
+using calibration::Fit;
+using calibration::kPercent;
+using calibration::Matrix;
+using calibration::Start;
+
 /// σ of ln f from which on the lines leave the focal length open.
 constexpr double kFocalOpen = 0.2;
 /// σ of the rotation, radians, from which on there is no camera.
 constexpr double kRotationOpen = 0.2;
-constexpr double kWeakFocal = 0.05;
-constexpr double kWeakRotation = glm::radians(1.0);
-constexpr double kWeakPosition = 0.05;
 /// Lines have heavier tails than their linearised deviation: one draw in 200 on truth room a passed
 /// 3 σ and lost the better EXIF value. A crop or a wrong 35 mm value is off by far more.
 constexpr double kDisagreementSigmas = 4.0;
 /// Residuals beyond both are no lines of one direction: multiples of σ, share of the diagonal.
 constexpr double kMaxResidualSigmas = 8.0;
 constexpr double kMaxResidualShare = 0.01;
-/// Component of x to the right in the picture below which its sign is luck.
-constexpr double kSignMargin = 0.03;
-/// Normal quantile of the test for consistent segments (one in a thousand).
-constexpr double kConsistencyQuantile = 3.09;
-
-constexpr double kPercent = 100.0;
-
-void checkOptions(const CalibrationOptions& options)
-{
-    INSITU_CHECK(options.segment_sigma_px > 0.0, "segment_sigma_px {}", options.segment_sigma_px);
-    INSITU_CHECK(options.exif_focal_sigma > 0.0, "exif_focal_sigma {}", options.exif_focal_sigma);
-    INSITU_CHECK(!options.exif_focal_px || *options.exif_focal_px > 0.0,
-                 "exif_focal_px {}",
-                 *options.exif_focal_px);
-}
+/// Prior of a lens about which nothing is said: all that the model is for.
+constexpr double kDivisionSigma = 0.15;
+/// A lens shows in straight segments from this many standard deviations and equations left on.
+constexpr double kDivisionTold = 4.0;
+constexpr double kDivisionFreedom = 8.0;
 
 void checkAxes(const LineSet& lines, const std::string& source)
 {
@@ -61,122 +53,96 @@ void checkAxes(const LineSet& lines, const std::string& source)
                             "segments",
                             "one segment per axis is not enough; mark at least two edges along "
                             "one direction");
+    if (!lines.camera_height_m && lines.lengths.empty())
+        throw NoAnswerError(
+            source, "scale", "no scale: give the camera's height or a known length");
 }
 
-/// Largest χ² that n degrees of freedom explain (Wilson–Hilferty).
-double chiSquaredLimit(double freedom)
+bool tracedLines(const LineSet& lines)
 {
-    const double spread = 2.0 / (9.0 * freedom);
-    return freedom * std::pow(1.0 - spread + kConsistencyQuantile * std::sqrt(spread), 3.0);
+    return !lines.straight_lines.empty() ||
+           std::any_of(lines.segments.begin(), lines.segments.end(), [](const auto& segment) {
+               return !segment.via_px.empty();
+           });
 }
 
-struct Solution {
-    OrientationEstimate orientation;
-    double sigma_px = 1.0;  ///< of an end point, as given or as large as the residuals show
-    bool inconsistent = false;
+Choice choiceOf(const LineSet& lines, const CalibrationOptions& options)
+{
+    Choice choice;
+    choice.sigma_px = options.segment_sigma_px;
+    choice.principal_px = {0.5 * lines.width, 0.5 * lines.height};
+    choice.principal_sigma_px = options.principal_sigma * std::max(lines.width, lines.height);
+    if (lines.principal_point) {
+        choice.principal_px = {lines.principal_point->px.x, lines.principal_point->px.y};
+        choice.principal_sigma_px = lines.principal_point->sigma_px;
+    }
+    if (lines.distortion.sigma > 0.0)
+        choice.division_sigma = lines.distortion.sigma;
+    else if (lines.distortion.division == 0.0 && tracedLines(lines))
+        choice.division_sigma = kDivisionSigma;
+    return choice;
+}
+
+/// A solve and what led to it.
+struct Solved {
+    Start start;
+    std::optional<Fit> fit;  ///< nothing when there is a complaint or no solve converges
+
+    [[nodiscard]] double focal() const { return std::exp(fit->solution.state.log_focal); }
+    [[nodiscard]] double focalSigma() const
+    {
+        const Matrix covariance = fit->covariance();
+        return std::sqrt(covariance(calibration::kLogFocal, calibration::kLogFocal));
+    }
+    [[nodiscard]] bool focalAtLimit(const LineSet& lines) const
+    {
+        const double relative = focal() / std::max(lines.width, lines.height);
+        return relative < 1.02 * kShortestFocal || relative > 0.98 * kLongestFocal;
+    }
+    [[nodiscard]] bool focalKnown(const LineSet& lines) const
+    {
+        return fit && !focalAtLimit(lines) && focalSigma() < kFocalOpen;
+    }
 };
 
-bool consistent(const OrientationEstimate& orientation)
+/// The lens as given or traced, or as straight segments show it when they do so clearly.
+Solved solveWith(const LineSet& lines, Choice choice, const std::string& source)
 {
-    return orientation.freedom < 1.0 ||
-           orientation.chi_squared <= chiSquaredLimit(orientation.freedom);
+    const auto start = calibration::findStart(lines, choice, source);
+    if (!start) return {};
+    Solved solved{*start, std::nullopt};
+    if (!start->complaint.empty()) return solved;
+    solved.fit = calibration::fit(lines, start->state, choice);
+    const bool asked = choice.division_sigma || lines.distortion.division != 0.0;
+    if (!solved.fit || asked || solved.fit->freedom < kDivisionFreedom) return solved;
+    if (calibration::divisionScore(*solved.fit) < kDivisionTold) return solved;
+    choice.division_sigma = kDivisionSigma;
+    auto bent = calibration::fit(lines, solved.fit->solution.state, choice);
+    if (!bent) return solved;
+    const double sigma =
+        std::sqrt(bent->covariance()(calibration::kDivision, calibration::kDivision));
+    if (std::abs(bent->solution.state.division) > kDivisionTold * sigma)
+        solved.fit = std::move(bent);
+    return solved;
 }
 
-/// Solves with common corners; without them when they contradict the lines (ends that only look
-/// like a corner). When even then the residuals are too large for the stated error, once more with
-/// the larger one, so that the prior gets the weight that it deserves and the covariance is honest.
-std::optional<Solution> solve(const LineSet& lines,
-                              glm::dvec2 principal_px,
-                              double sigma_px,
-                              const std::optional<FocalPrior>& prior)
-{
-    const auto shared = solveOrientation(lines, principal_px, sigma_px, prior);
-    if (shared && consistent(*shared)) return Solution{*shared, sigma_px, false};
-    const auto separate = solveOrientation(lines, principal_px, sigma_px, prior, Corners::Separate);
-    if (!separate) return std::nullopt;
-    if (consistent(*separate)) return Solution{*separate, sigma_px, false};
-    const double larger = sigma_px * std::sqrt(separate->chi_squared / separate->freedom);
-    const auto again = solveOrientation(lines, principal_px, larger, prior, Corners::Separate);
-    if (!again) return std::nullopt;
-    return Solution{*again, larger, true};
-}
-
-/// The lines alone, the lines with EXIF, and which of them is the answer.
-struct FocalChoice {
-    Solution solution;
-    Findings findings;
-};
-
-bool focalKnown(const std::optional<Solution>& alone)
-{
-    return alone && !alone->orientation.focal_at_limit &&
-           alone->orientation.lines_focal_sigma < kFocalOpen;
-}
-
-Finding disagreement(const OrientationEstimate& alone, const FocalPrior& exif)
+Finding disagreement(const Solved& alone, const FocalPrior& exif)
 {
     return {Severity::Warning,
             "focal-disagrees-with-exif",
             fmt::format("the lines say {:.1f} px ± {:.1f} % focal length, EXIF says {:.1f} px ± "
                         "{:.1f} % ({:+.1f} %); the lines alone are used. Cropped picture, or lines "
                         "that are not at right angles?",
-                        alone.focal_px,
-                        kPercent * alone.lines_focal_sigma,
+                        alone.focal(),
+                        kPercent * alone.focalSigma(),
                         exif.focal_px,
                         kPercent * exif.sigma,
-                        kPercent * (alone.focal_px / exif.focal_px - 1.0))};
-}
-
-FocalChoice chooseFocal(const LineSet& lines,
-                        glm::dvec2 principal_px,
-                        const CalibrationOptions& options,
-                        const std::string& source)
-{
-    const auto alone = solve(lines, principal_px, options.segment_sigma_px, std::nullopt);
-    const bool known = focalKnown(alone);
-    if (!options.exif_focal_px) {
-        if (!alone || alone->orientation.focal_at_limit)
-            throw NoAnswerError(source,
-                                "segments",
-                                "no real focal length fits these lines and there is none in EXIF; "
-                                "check that each segment is marked with the right axis, or give "
-                                "the focal length");
-        if (!known)
-            throw NoAnswerError(source,
-                                "segments",
-                                "the lines leave the focal length open (one-point view or too few "
-                                "segments) and there is none in EXIF; mark more edges along a "
-                                "second receding direction, or give the focal length");
-        return {*alone, {}};
-    }
-    const FocalPrior exif{*options.exif_focal_px, options.exif_focal_sigma};
-    Findings findings;
-    if (known) {
-        const OrientationEstimate& own = alone->orientation;
-        const double off = std::abs(std::log(own.focal_px / exif.focal_px));
-        const double expected = std::hypot(own.lines_focal_sigma, exif.sigma);
-        const bool contradicts = off > kDisagreementSigmas * expected;
-        if (contradicts) findings.push_back(disagreement(own, exif));
-        if (contradicts || !options.use_exif) return {*alone, findings};
-    }
-    const auto both = solve(lines, principal_px, options.segment_sigma_px, exif);
-    if (!both)
-        throw NoAnswerError(
-            source, "segments", "no rotation fits these lines; check the axis of each segment");
-    if (!known)
-        findings.push_back(
-            {Severity::Warning,
-             "focal-from-exif",
-             fmt::format("the lines leave the focal length open; {:.1f} px ± {:.1f} % from EXIF is "
-                         "used",
-                         exif.focal_px,
-                         kPercent * exif.sigma)});
-    return {*both, findings};
+                        kPercent * (alone.focal() / exif.focal_px - 1.0))};
 }
 
 /// Lines that do not meet in a direction at right angles to the others.
 void checkResiduals(const LineSet& lines,
-                    const OrientationEstimate& orientation,
+                    const Fit& fit,
                     const CalibrationOptions& options,
                     const std::string& source)
 {
@@ -186,8 +152,10 @@ void checkResiduals(const LineSet& lines,
         double sum = 0.0;
         int count = 0;
         for (std::size_t i = 0; i < lines.segments.size(); ++i) {
-            if (static_cast<int>(lines.segments[i].axis) != axis) continue;
-            sum += orientation.distances_px[i] * orientation.distances_px[i];
+            if (static_cast<int>(lines.segments[i].axis) != axis || !fit.choice.used_segments[i])
+                continue;
+            const double distance = calibration::endDistance(lines, i, fit.solution.state);
+            sum += distance * distance;
             ++count;
         }
         const double rms = count > 0 ? std::sqrt(sum / count) : 0.0;
@@ -202,151 +170,174 @@ void checkResiduals(const LineSet& lines,
     }
 }
 
-/// Room axes in the camera's frame with the signs of LineSet's convention.
-struct SignedAxes {
-    glm::dvec3 x, y, z;
-};
-
-/// Up is up in the picture. Only a camera that looks nearly straight up or down has no such
-/// direction: there the origin, a floor point in front of the camera, decides.
-SignedAxes orient(const glm::dmat3& camera_from_world,
-                  glm::dvec3 origin_ray,
-                  const std::string& source,
-                  Findings& findings)
+[[noreturn]] void failWithoutFocal(const LineSet& lines,
+                                   const Solved& alone,
+                                   const CalibrationOptions& options,
+                                   const std::string& source)
 {
-    glm::dvec3 up = camera_from_world[1];
-    const bool steep = std::abs(up.z) > 0.99;
-    if (!steep && std::abs(up.x) > std::sqrt(3.0) * std::abs(up.y))
+    if (!alone.start.complaint.empty())
+        throw NoAnswerError(source, alone.start.place, alone.start.complaint);
+    if (alone.fit) checkResiduals(lines, *alone.fit, options, source);
+    if (!alone.fit || alone.focalAtLimit(lines))
         throw NoAnswerError(source,
                             "segments",
-                            "up would point sideways in the picture: the y segments run "
-                            "horizontally, or x and z are not the horizontal directions; check the "
-                            "axes, and that the photograph is upright");
-    if (steep ? glm::dot(up, origin_ray) > 0.0 : up.y > 0.0) up = -up;
-    glm::dvec3 right = camera_from_world[0];
-    if (right.x < 0.0) right = -right;
-    if (right.x < kSignMargin)
-        findings.push_back(
-            {Severity::Warning,
-             "axis-sign-ambiguous",
-             "the x direction runs almost along the view, so that its \"right\" hangs on a hair; "
-             "exchange x and z"});
-    return {right, up, glm::cross(right, up)};
+                            "no real focal length fits these lines and there is none in EXIF; "
+                            "check that each segment is marked with the right axis, or give the "
+                            "focal length");
+    throw NoAnswerError(source,
+                        "segments",
+                        "the lines leave the focal length open (one-point view or too few "
+                        "segments) and there is none in EXIF; mark more edges along a second "
+                        "receding direction, a rectangle of known ratio or a known length that "
+                        "recedes, or give the focal length");
 }
 
-Camera cameraFrom(const LineSet& lines,
-                  glm::dvec2 principal_px,
-                  double focal_px,
-                  const SignedAxes& axes)
+/// The lines alone, the lines with EXIF, and which of them is the answer.
+Solved chooseFocal(const LineSet& lines,
+                   const CalibrationOptions& options,
+                   const std::string& source,
+                   Findings& findings)
 {
+    Choice choice = choiceOf(lines, options);
+    Solved alone = solveWith(lines, choice, source);
+    const bool known = alone.focalKnown(lines);
+    if (!options.exif_focal_px) {
+        if (!known) failWithoutFocal(lines, alone, options, source);
+        return alone;
+    }
+    const FocalPrior exif{*options.exif_focal_px, options.exif_focal_sigma};
+    if (known) {
+        const double off = std::abs(std::log(alone.focal() / exif.focal_px));
+        const double expected = std::hypot(alone.focalSigma(), exif.sigma);
+        const bool contradicts = off > kDisagreementSigmas * expected;
+        if (contradicts) findings.push_back(disagreement(alone, exif));
+        if (contradicts || !options.use_exif) return alone;
+    }
+    choice.focal = exif;
+    Solved both = solveWith(lines, choice, source);
+    if (!both.start.complaint.empty())
+        throw NoAnswerError(source, both.start.place, both.start.complaint);
+    if (!both.fit)
+        throw NoAnswerError(
+            source, "segments", "no rotation fits these lines; check the axis of each segment");
+    if (!known)
+        findings.push_back(
+            {Severity::Warning,
+             "focal-from-exif",
+             fmt::format("the lines leave the focal length open; {:.1f} px ± {:.1f} % from EXIF is "
+                         "used",
+                         exif.focal_px,
+                         kPercent * exif.sigma)});
+    return both;
+}
+
+Camera cameraFrom(const LineSet& lines, const calibration::State& state)
+{
+    const auto row = [&](int i) {
+        const Eigen::RowVector3d r = state.camera_from_world.row(i);
+        return glm::dvec3(r[0], r[1], r[2]);
+    };
     Camera camera;
     camera.width = lines.width;
     camera.height = lines.height;
-    camera.focal_px = glm::dvec2(focal_px);
-    camera.principal_px = principal_px;
-    camera.right = glm::dvec3(axes.x.x, axes.y.x, axes.z.x);
-    camera.up = -glm::dvec3(axes.x.y, axes.y.y, axes.z.y);
-    camera.forward = glm::dvec3(axes.x.z, axes.y.z, axes.z.z);
+    camera.focal_px = glm::dvec2(std::exp(state.log_focal));
+    camera.principal_px = {state.principal_px.x(), state.principal_px.y()};
+    camera.position_m = {state.position_m.x(), state.position_m.y(), state.position_m.z()};
+    camera.right = glm::normalize(row(0));
+    camera.forward = glm::normalize(row(2) - glm::dvec3(0.0));
+    camera.up = glm::cross(camera.right, camera.forward);
+    camera.division = state.division;
     return camera;
 }
 
-void reportDoubts(const LineSet& lines, const Solution& solution, CameraEstimate& estimate)
-{
-    const OrientationEstimate& orientation = solution.orientation;
-    if (solution.inconsistent) {
-        const auto worst =
-            std::max_element(orientation.distances_px.begin(), orientation.distances_px.end());
-        const auto index = static_cast<std::size_t>(worst - orientation.distances_px.begin());
-        estimate.findings.push_back(
-            {Severity::Warning,
-             "segments-inconsistent",
-             fmt::format("the segments miss their vanishing points by {:.2f} px (rms); worst is "
-                         "segments[{}] ({}) with {:.2f} px: check its ends and axis, or the lens "
-                         "bends lines",
-                         estimate.residual_rms_px,
-                         index,
-                         axisName(lines.segments[index].axis),
-                         *worst)});
-    }
-    const double focal = orientation.focalSigma();
-    const double distance = glm::length(estimate.camera.position_m);
-    const double place = glm::length(estimate.position_sigma_m) / distance;
-    if (focal > kWeakFocal || estimate.rotation_sigma_rad > kWeakRotation || place > kWeakPosition)
-        estimate.findings.push_back(
-            {Severity::Warning,
-             "calibration-weak",
-             fmt::format("focal length ± {:.1f} %, rotation ± {:.2f}°, position ± {:.1f} % of the "
-                         "distance: mark longer edges, and more of them",
-                         kPercent * focal,
-                         glm::degrees(estimate.rotation_sigma_rad),
-                         kPercent * place)});
-    estimate.findings.push_back({Severity::Info,
-                                 "principal-point-assumed",
-                                 fmt::format("the optical axis is taken to meet the picture's "
-                                             "middle ({:.1f}, {:.1f}) px; untrue for cropped or "
-                                             "shifted pictures",
-                                             estimate.camera.principal_px.x,
-                                             estimate.camera.principal_px.y)});
-}
-
 std::array<std::optional<glm::dvec2>, 3> vanishingPoints(const LineSet& lines,
-                                                         const Camera& camera,
-                                                         const SignedAxes& axes)
+                                                         const calibration::State& state)
 {
     constexpr double kInfinityPx = 1e6;
     std::array<std::optional<glm::dvec2>, 3> points;
-    const glm::dvec3 directions[] = {axes.x, axes.y, axes.z};
     for (const LineSegment& segment : lines.segments) {
-        const glm::dvec3 d = directions[static_cast<int>(segment.axis)];
-        const glm::dvec2 finite = glm::dvec2(d) * camera.focal_px;
-        if (glm::length(finite) < kInfinityPx * std::abs(d.z))
-            points[static_cast<std::size_t>(segment.axis)] = finite / d.z + camera.principal_px;
+        const Eigen::Vector3d d = state.camera_from_world.col(static_cast<int>(segment.axis));
+        const glm::dvec2 finite = glm::dvec2(d.x(), d.y()) * std::exp(state.log_focal);
+        if (glm::length(finite) < kInfinityPx * std::abs(d.z()))
+            points[static_cast<std::size_t>(segment.axis)] =
+                finite / d.z() + glm::dvec2(state.principal_px.x(), state.principal_px.y());
     }
     return points;
 }
 
+void fillSigmas(const Fit& fit, CameraEstimate& estimate)
+{
+    const Matrix covariance = fit.covariance();
+    for (int row = 0; row < calibration::kUnknowns; ++row)
+        for (int column = 0; column < calibration::kUnknowns; ++column)
+            estimate.covariance[row][column] = covariance(row, column);
+    const calibration::Vector sigma = covariance.diagonal().cwiseSqrt();
+    estimate.focal_sigma_px = estimate.camera.focal_px.x * sigma[calibration::kLogFocal];
+    for (int i = 0; i < 2; ++i)
+        estimate.principal_sigma_px[i] = sigma[calibration::kPrincipal + i];
+    estimate.division_sigma = sigma[calibration::kDivision];
+    for (int i = 0; i < 3; ++i) {
+        estimate.turn_sigma_rad[i] = sigma[calibration::kTurn + i];
+        estimate.position_sigma_m[i] = sigma[calibration::kPosition + i];
+    }
+    estimate.rotation_sigma_rad = glm::length(estimate.turn_sigma_rad);
+}
+
 }  // namespace
+
+Findings CalibrationOptions::validate() const
+{
+    Findings problems;
+    const auto require = [&](bool holds, const std::string& message) {
+        if (!holds) problems.push_back({Severity::Error, "calibration-options", message});
+    };
+    require(segment_sigma_px > 0.0 && std::isfinite(segment_sigma_px),
+            fmt::format("segment_sigma_px must be above 0, is {}", segment_sigma_px));
+    require(exif_focal_sigma > 0.0 && std::isfinite(exif_focal_sigma),
+            fmt::format("exif_focal_sigma must be above 0, is {}", exif_focal_sigma));
+    require(!exif_focal_px || (*exif_focal_px > 0.0 && std::isfinite(*exif_focal_px)),
+            "exif_focal_px must be above 0");
+    require(principal_sigma >= 0.0 && principal_sigma <= 1.0,
+            fmt::format("principal_sigma must lie in [0, 1], is {}", principal_sigma));
+    return problems;
+}
 
 CameraEstimate calibrateCamera(const LineSet& marked,
                                const CalibrationOptions& options,
                                const std::string& source)
 {
-    checkOptions(options);
+    requireValid(options.validate(), "calibration options");
     marked.check(source);
-    const LineSet lines = straightened(marked, source);
-    checkAxes(lines, source);
-    const glm::dvec2 principal_px = glm::dvec2(lines.width, lines.height) * 0.5;
-
-    FocalChoice choice = chooseFocal(lines, principal_px, options, source);
-    const OrientationEstimate& orientation = choice.solution.orientation;
-    checkResiduals(lines, orientation, options, source);
-    if (!(orientation.rotationSigma() < kRotationOpen))
+    checkAxes(marked, source);
+    CameraEstimate estimate;
+    const Solved solved = chooseFocal(marked, options, source, estimate.findings);
+    const Fit& fit = *solved.fit;
+    checkResiduals(marked, fit, options, source);
+    estimate.camera = cameraFrom(marked, fit.solution.state);
+    fillSigmas(fit, estimate);
+    if (!(estimate.rotation_sigma_rad < kRotationOpen))
         throw NoAnswerError(source,
                             "segments",
                             "the lines leave the camera's rotation open; mark more edges along at "
                             "least two directions");
-
-    CameraEstimate estimate;
-    estimate.findings = std::move(choice.findings);
-    const glm::dvec3 origin_ray((lines.origin_px - principal_px) / orientation.focal_px, 1.0);
-    const SignedAxes axes =
-        orient(orientation.camera_from_world, origin_ray, source, estimate.findings);
-    estimate.camera = cameraFrom(lines, principal_px, orientation.focal_px, axes);
-    CameraPlace place =
-        placeCamera(lines, estimate.camera, orientation, choice.solution.sigma_px, source);
-    estimate.camera.position_m = place.position_m;
-    estimate.position_sigma_m = place.position_sigma_m;
-    estimate.focal_sigma_px = orientation.focal_px * orientation.focalSigma();
-    estimate.rotation_sigma_rad = orientation.rotationSigma();
+    if (solved.start.x_ambiguous)
+        estimate.findings.push_back(
+            {Severity::Warning,
+             "axis-sign-ambiguous",
+             "the x direction runs almost along the view, so that its \"right\" hangs on a hair; "
+             "exchange x and z"});
     double sum = 0.0;
-    for (const double distance : orientation.distances_px)
+    double used = 0.0;
+    for (std::size_t i = 0; i < marked.segments.size(); ++i) {
+        if (!fit.choice.used_segments[i]) continue;
+        const double distance = calibration::endDistance(marked, i, fit.solution.state);
         sum += distance * distance;
-    estimate.residual_rms_px =
-        std::sqrt(sum / static_cast<double>(orientation.distances_px.size()));
-    estimate.vanishing_points_px = vanishingPoints(lines, estimate.camera, axes);
-    estimate.camera.division = marked.distortion.division;
-    append(estimate.findings, std::move(place.findings));
-    reportDoubts(lines, choice.solution, estimate);
+        used += 1.0;
+    }
+    estimate.residual_rms_px = std::sqrt(sum / used);
+    estimate.vanishing_points_px = vanishingPoints(marked, fit.solution.state);
+    estimate.outlier_segments = fit.outliers;
+    append(estimate.findings, calibration::describeFit(marked, fit, options, estimate));
     return estimate;
 }
 

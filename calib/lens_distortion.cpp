@@ -12,21 +12,18 @@ namespace {
 /// Above this magnification the model has left the lens it describes.
 constexpr double kFold = 10.0;
 
-Camera lensOf(const LineSet& lines)
+}  // namespace
+
+LineSet straightened(const LineSet& lines,
+                     glm::dvec2 principal_px,
+                     double division,
+                     const std::string& source)
 {
     Camera lens;
     lens.width = lines.width;
     lens.height = lines.height;
-    lens.principal_px = glm::dvec2(lines.width, lines.height) * 0.5;
-    lens.division = lines.distortion.division;
-    return lens;
-}
-
-}  // namespace
-
-LineSet straightened(const LineSet& lines, const std::string& source)
-{
-    const Camera lens = lensOf(lines);
+    lens.principal_px = principal_px;
+    lens.division = division;
     LineSet result = lines;
     result.distortion = {};
     const auto straighten = [&](glm::dvec2& point) {
@@ -44,12 +41,8 @@ LineSet straightened(const LineSet& lines, const std::string& source)
     for (LineSegment& segment : result.segments) {
         straighten(segment.from_px);
         straighten(segment.to_px);
+        segment.via_px.clear();
     }
-    for (KnownLength& length : result.lengths) {
-        straighten(length.from_px);
-        straighten(length.to_px);
-    }
-    straighten(result.origin_px);
     return result;
 }
 

@@ -89,7 +89,7 @@ struct CompletedLines {
 
 /// strokes   at least two of two axes, as for calib/camera_solve.h; distortion must be 0 (an edge
 ///           is bent in the picture, and straight only in the straightened one)
-/// The strokes' directions come from solveOrientation; nothing when it gives none.
+/// The strokes' directions come from findOrientation; nothing when it gives none.
 [[nodiscard]] std::optional<CompletedLines> completeStrokes(const LineSet& strokes,
                                                             const EncodedImage& image,
                                                             const std::optional<FocalPrior>& prior,

@@ -74,12 +74,12 @@ std::optional<manhattan::Frame> frameOf(const LineSet& strokes,
                                         const std::optional<FocalPrior>& prior)
 {
     const glm::dvec2 middle(0.5 * strokes.width, 0.5 * strokes.height);
-    const auto start = solveOrientation(strokes, middle, kStrokeSigma * task.long_side, prior);
-    if (!start || start->focal_at_limit || !(start->rotationSigma() < kRotationOpen))
+    const auto start = findOrientation(strokes, middle, kStrokeSigma * task.long_side, prior);
+    if (!start || start->focal_at_limit || !(start->rotation_sigma < kRotationOpen))
         return std::nullopt;
     manhattan::Frame frame{start->camera_from_world, start->focal_px, kStartSlack, 0.0};
     const manhattan::Frame better = manhattan::refined(task, frame);
-    const double allowed = std::max(kLeastAgreement, kAgreement * start->rotationSigma());
+    const double allowed = std::max(kLeastAgreement, kAgreement * start->rotation_sigma);
     if (manhattan::axesApart(better, frame) < allowed) return better;
     return frame;
 }

@@ -17,7 +17,26 @@ Json cameraJson(const CameraEstimate& estimate)
             {"position_m", toJson(camera.position_m)},
             {"position_m_sigma", toJson(estimate.position_sigma_m)},
             {"rotation_deg_sigma", estimate.rotation_sigma_rad * 180.0 / std::numbers::pi},
+            {"principal_point_px", toJson(camera.principal_px)},
+            {"principal_point_px_sigma", toJson(estimate.principal_sigma_px)},
+            {"division", camera.division},
+            {"division_sigma", estimate.division_sigma},
             {"residual_rms_px", estimate.residual_rms_px}};
+}
+
+/// How far off each object may stand, from the camera's covariance; null where that is unknown.
+Json placementsJson(const Project& project, const CameraEstimate& estimate)
+{
+    constexpr double kCentimetres = 100.0;
+    Json list = Json::array();
+    for (const ProjectObject& object : project.objects) {
+        const auto sigma = placementSigma(estimate, object.position_m);
+        list.push_back(sigma ? Json{{"along_cm", kCentimetres * sigma->along_m},
+                                    {"across_cm", kCentimetres * sigma->across_m},
+                                    {"height_cm_per_m", kCentimetres * sigma->height_m}}
+                             : Json());
+    }
+    return list;
 }
 
 }  // namespace
@@ -40,6 +59,7 @@ void writeReport(const std::filesystem::path& path,
         {"project", project.file.string()},
         {"picture", picture.string()},
         {"camera", cameraJson(result.camera)},
+        {"placement_sigma", placementsJson(project, result.camera)},
         {"light",
          {{"center_m", toJson(result.light.center_m)},
           {"environment_px",

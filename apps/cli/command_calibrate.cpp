@@ -303,6 +303,14 @@ void registerCalibrate(CLI::App& app, Context& context)
         ->add_option(
             "--focal-px", arguments->focal_px, "Focal length in pixels, in place of EXIF's")
         ->check(CLI::PositiveNumber);
+    command
+        ->add_option(
+            "--principal-sigma",
+            arguments->options.principal_sigma,
+            "How far the optical axis may miss the picture's middle, standard deviation as "
+            "a share of the long side; 0: not at all; a crop needs more")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
     command->add_flag("--ignore-exif-focal",
                       arguments->ignore_exif_focal,
                       "Use the lines alone where they suffice; EXIF only checks");

@@ -101,6 +101,59 @@ TEST_F(LinesFile, ComplaintsNameFilePlaceAndCause)
                 HasSubstr("absent.json"));
 }
 
+TEST_F(LinesFile, EverythingThatMayBeKnownIsRead)
+{
+    const LineSet lines = readLineSet(write(R"({
+      "image": {"width": 800, "height": 600},
+      "segments": [{"axis": "z", "points_px": [[1, 2], [50, 21], [100, 42]]}],
+      "origin_px": [420, 455],
+      "scale": {"lengths": [{"from_px": [1, 500], "to_px": [90, 510], "on": "floor",
+                             "metres": 0.8, "sigma_m": 0.01}]},
+      "distortion": {"division": -0.05, "sigma": 0.02},
+      "straight_lines": [{"points_px": [[1, 2], [3, 4], [5, 7]], "note": "curtain rail"}],
+      "rectangles": [{"corners_px": [[0, 0], [90, 5], [80, 60], [3, 70]], "ratio": 1.5, "on": "floor"},
+                     {"corners_px": [[0, 0], [90, 5], [80, 60], [3, 70]]}],
+      "right_angles": [{"corner_px": [10, 500], "first_px": [90, 500], "second_px": [20, 560]}],
+      "points": [{"at_px": [300, 500], "position_m": [0.5, 0, -1], "sigma_m": 0.02}],
+      "principal_point": {"px": [410, 290], "sigma_px": 4},
+      "gravity": {"up_in_camera": [0, -0.9, 0.1], "sigma_deg": 2}
+    })"));
+    EXPECT_EQ(lines.segments[0].to_px, glm::dvec2(100, 42));
+    EXPECT_EQ(lines.segments[0].via_px, std::vector<glm::dvec2>({{50, 21}}));
+    EXPECT_EQ(lines.lengths[0].sigma_m, 0.01);
+    EXPECT_EQ(lines.distortion.sigma, 0.02);
+    EXPECT_EQ(lines.straight_lines[0].size(), 3u);
+    EXPECT_TRUE(lines.rectangles[0].on_floor);
+    EXPECT_EQ(lines.rectangles[0].ratio, 1.5);
+    EXPECT_FALSE(lines.rectangles[1].on_floor);
+    EXPECT_EQ(lines.rectangles[1].ratio, 0.0);
+    EXPECT_EQ(lines.right_angles[0].second_px, glm::dvec2(20, 560));
+    EXPECT_EQ(lines.points[0].position_m, glm::dvec3(0.5, 0, -1));
+    EXPECT_EQ(lines.principal_point->sigma_px, 4.0);
+    EXPECT_NEAR(lines.gravity->sigma_rad, glm::radians(2.0), tolerance::kDouble);
+}
+
+TEST_F(LinesFile, WhatMayBeKnownIsChecked)
+{
+    const auto with = [&](const std::string& more) {
+        return complaintAbout(changed("\"origin_px\"", more + ", \"origin_px\""));
+    };
+    EXPECT_THAT(with(R"("straight_lines": [{"points_px": [[1, 2], [3, 4]]}])"),
+                HasSubstr("at least 3 points"));
+    EXPECT_THAT(with(R"("rectangles": [{"corners_px": [[0, 0], [80, 60], [90, 5], [3, 70]]}])"),
+                HasSubstr("rectangles[0].corners_px"));
+    EXPECT_THAT(with(R"("rectangles": [{"corners_px": [[0, 0], [9, 0], [9, 9], [0, 9], [1, 1]]}])"),
+                HasSubstr("four corners"));
+    EXPECT_THAT(
+        with(R"("rectangles": [{"corners_px": [[0, 0], [9, 0], [9, 9], [0, 9]], "on": "wall"}])"),
+        HasSubstr("floor"));
+    EXPECT_THAT(with(R"("points": [{"at_px": [1e9, 0], "position_m": [0, 0, 0]}])"),
+                HasSubstr("points[0].at_px"));
+    EXPECT_THAT(with(R"("gravity": {"up_in_camera": [0, 0, 0]})"), HasSubstr("no direction"));
+    EXPECT_THAT(complaintAbout(changed("\"from_px\": [1.5, 2]", "\"points_px\": [[1, 2], [3, 4]]")),
+                HasSubstr("either"));
+}
+
 TEST_F(LinesFile, NoScaleIsAnError)
 {
     const std::string text =
@@ -121,13 +174,16 @@ TEST_F(LinesFile, CameraSurvivesTheRoundTrip)
     EXPECT_EQ(read.camera.width, 1200);
     EXPECT_EQ(read.camera.height, 900);
     EXPECT_EQ(read.camera.focal_px, written.camera.focal_px);
-    EXPECT_EQ(read.camera.principal_px, glm::dvec2(600.0, 450.0));
+    EXPECT_EQ(read.camera.principal_px, written.camera.principal_px);
     EXPECT_EQ(read.camera.division, -0.03);
     EXPECT_EQ(read.camera.position_m, written.camera.position_m);
     EXPECT_LT(synthetic::rotationError(read.camera, written.camera), tolerance::kDouble);
     EXPECT_DOUBLE_EQ(read.focal_sigma_px, written.focal_sigma_px);
     EXPECT_NEAR(read.rotation_sigma_rad, written.rotation_sigma_rad, tolerance::kDouble);
     EXPECT_EQ(read.position_sigma_m, written.position_sigma_m);
+    EXPECT_EQ(read.principal_sigma_px, written.principal_sigma_px);
+    EXPECT_EQ(read.covariance, written.covariance);
+    EXPECT_LT(glm::length(read.turn_sigma_rad - written.turn_sigma_rad), tolerance::kDouble);
     EXPECT_EQ(read.residual_rms_px, written.residual_rms_px);
     for (std::size_t axis = 0; axis < 3; ++axis)
         EXPECT_EQ(read.vanishing_points_px[axis], written.vanishing_points_px[axis]);
