@@ -352,6 +352,14 @@ TEST(ApplyAlignment, AWholePixelShiftMovesCodes)
     }
 }
 
+/// The frame and the same codes under half its exposure: under one exposure they would count once.
+Bracket pairOf(const BracketFrame& frame)
+{
+    BracketFrame shorter = frame;
+    shorter.relative_exposure *= 0.5;
+    return makeBracket({frame, shorter});
+}
+
 TEST(ApplyAlignment, ASmoothPictureIsResampledToOneCode)
 {
     const auto wave = [](double x, double y) {
@@ -364,7 +372,7 @@ TEST(ApplyAlignment, ASmoothPictureIsResampledToOneCode)
         for (int x = 0; x < 80; ++x)
             frame.image.codes(x, y) =
                 glm::u16vec3(static_cast<std::uint16_t>(std::lround(wave(x + 0.5, y + 0.5))));
-    const Bracket bracket = makeBracket({frame, frame});
+    const Bracket bracket = pairOf(frame);
     Alignment alignment;
     const glm::dmat3 motion = rigidMotion(80, 60, {0.5, -0.5}, 1.5 * kDegree);
     alignment.frame_from_reference = {glm::dmat3(1.0), motion};
@@ -388,7 +396,7 @@ TEST(ApplyAlignment, ClippedAreasStayClippedAndNothingElseBecomesSo)
     for (int y = 10; y < 20; ++y)
         for (int x = 15; x < 25; ++x)
             frame.image.codes(x, y) = glm::u16vec3(255, 255, 110);
-    const Bracket bracket = makeBracket({frame, frame});
+    const Bracket bracket = pairOf(frame);
     Alignment alignment;
     alignment.frame_from_reference = {glm::dmat3(1.0), rigidMotion(40, 30, {0.4, 0.3}, 0.0)};
     const BracketFrame after = applyAlignment(bracket, alignment).frames[1];
@@ -410,7 +418,7 @@ TEST(ApplyAlignment, ExcludedPixelsStayExcluded)
     frame.excluded = Image<std::uint8_t>(20, 20);
     frame.excluded(10, 10) = 1;
     frame.image.codes(10, 10) = glm::u16vec3(200);
-    const Bracket bracket = makeBracket({frame, frame});
+    const Bracket bracket = pairOf(frame);
     Alignment alignment;
     alignment.frame_from_reference = {glm::dmat3(1.0), rigidMotion(20, 20, {0.5, 0.0}, 0.0)};
     const BracketFrame after = applyAlignment(bracket, alignment).frames[1];
