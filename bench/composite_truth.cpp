@@ -1,6 +1,8 @@
 // How close the whole chain comes to rooms in which the object really stood.
 //
-//   composite_truth [--samples N] [--both] [--form ratio|difference] ROOM_FOLDER...
+//   composite_truth [--samples N] [--both] [--form ratio|difference]
+//                   [--technique reference|fiv|auto|fiv-distant|fiv-cube]... [--cache FOLDER]
+//                   [--pictures FOLDER] ROOM_FOLDER...
 //
 // A room is a folder with project.json, plate.jpg and, perhaps in a folder truth/, truth.json,
 // truth_linear.exr, plate_linear.exr (perhaps reduced in size) and object_mask.png. A residual is
@@ -10,6 +12,11 @@
 // changes by more than 2 %, 15x15). "far" pixels are more than 60 pixels from anything that it
 // changes by 0.5 %. The line "bound" is the photograph times the true ratio of each pixel: what
 // noise and clipped pixels of the photograph leave to be had.
+//
+// Several techniques are shown below each other; "render" and "cpu" are the seconds and processor
+// seconds of the render stage without the objects' visibility atlases, which are made once a model
+// ("tables" seconds). fiv-distant and fiv-cube leave out where light comes from, and what is
+// hidden.
 #include "core/check.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
@@ -236,28 +243,58 @@ Touched touched(const Vec3Image& codes, const Vec3Image& plate_codes, const Mask
     return out;
 }
 
-void printScore(const std::string& room, const char* mode, const Score& score)
+void printScore(const std::string& room, const std::string& mode, const Score& score)
 {
-    fmt::print("{:<14} {:<6}", room, mode);
+    fmt::print("{:<14} {:<11}", room, mode);
     fmt::print(" {:>7.4f} {:>8.4f} {:>7.4f}", score.object, score.contact, score.shadow);
 }
 
 void printRest(const InsertResult& result, const Touched& change)
 {
     double seconds = 0.0;
-    double render_seconds = 0.0;
+    StageTime rendering;
     for (const StageTime& time : result.times) {
         seconds += time.seconds;
-        if (time.stage == "render") render_seconds += time.seconds;
+        if (time.stage == "render") rendering = time;
     }
     const InsertionResult& render = result.render;
     fmt::print(" {:>7} {:>6.1f}", change.far_pixels, change.far_codes);
-    fmt::print(" {:>8.2f} {:>7.1f} {:>7.1f}", 100.0 * change.share, seconds, render_seconds);
-    fmt::print(" {:>7.1f} {:>9.5f}\n", render.mean_samples, render.ratio_error);
+    fmt::print(" {:>8.2f} {:>7.1f}", 100.0 * change.share, seconds);
+    fmt::print(" {:>7.2f} {:>7.2f} {:>6.2f}",
+               rendering.seconds - render.table_seconds,
+               rendering.processor_seconds - render.table_processor_seconds,
+               render.table_seconds);
+    fmt::print(" {:>7.2f} {:>9.5f}", render.mean_samples, render.ratio_error);
+    fmt::print(" {:>7.4f} {:>6.4f}\n", render.fiv_error.rms, render.fiv_error.upper);
     std::fflush(stdout);
 }
 
-void measure(std::filesystem::path folder, InsertOptions options, bool both)
+struct Technique {
+    std::string name;
+    insitu::Technique technique = insitu::Technique::Reference;
+    FivLight light = FivLight::Room;
+};
+
+Technique techniqueOf(const std::string& name)
+{
+    Technique found{.name = name};
+    if (name != "reference") found.technique = insitu::Technique::Fiv;
+    if (name == "auto") found.technique = insitu::Technique::Auto;
+    if (name == "fiv-distant") found.light = FivLight::Distant;
+    if (name == "fiv-cube") found.light = FivLight::Cube;
+    return found;
+}
+
+struct Arguments {
+    InsertOptions options;
+    std::vector<std::string> techniques = {"reference"};
+    std::filesystem::path pictures;
+    bool both = false;
+    std::string form = "ratio";
+    std::vector<std::filesystem::path> rooms;
+};
+
+void measure(std::filesystem::path folder, const Arguments& arguments)
 {
     if (!folder.has_filename()) folder = folder.parent_path();
     const std::string room = folder.filename().string();
@@ -269,17 +306,38 @@ void measure(std::filesystem::path folder, InsertOptions options, bool both)
     printScore(room, "bound", bestPossible(plate, truth));
     fmt::print("\n");
     const Project project = readProject(folder / "project.json");
-    for (const bool with_exif : {true, false}) {
-        if (!with_exif && !both) continue;
-        options.use_exif_focal = with_exif;
-        Progress silent;
-        const InsertResult result = insertObjects(project, options, silent);
-        const Vec3Image codes = eightBitCodes(result.composite.image);
-        printScore(room,
-                   with_exif ? "exif" : "lines",
-                   score(reduced(linearised(codes, truth.inverse), truth.reduction), truth));
-        printRest(result, touched(codes, plate, truth.far));
-    }
+    for (const std::string& name : arguments.techniques)
+        for (const bool with_exif : {true, false}) {
+            if (!with_exif && !arguments.both) continue;
+            InsertOptions options = arguments.options;
+            options.use_exif_focal = with_exif;
+            const Technique technique = techniqueOf(name);
+            options.render.technique = technique.technique;
+            options.render.fiv.light = technique.light;
+            Progress silent;
+            const InsertResult result = insertObjects(project, options, silent);
+            const Vec3Image codes = eightBitCodes(result.composite.image);
+            printScore(room,
+                       with_exif ? name : name + "-l",
+                       score(reduced(linearised(codes, truth.inverse), truth.reduction), truth));
+            printRest(result, touched(codes, plate, truth.far));
+            if (!arguments.pictures.empty())
+                writeEncoded(
+                    arguments.pictures / (room + "-" + name + ".png"), result.composite.image, {});
+            if (!arguments.pictures.empty()) {
+                const RenderLayers& layers = result.render.layers;
+                cv::Mat_<cv::Vec3b> ratio(codes.rows, codes.cols);
+                ratio.forEach([&](cv::Vec3b& pixel, const int* at) {
+                    const Rgb w = layers.irradiance_with(at[1], at[0]);
+                    const Rgb o = layers.irradiance_without(at[1], at[0]);
+                    for (int c = 0; c < 3; ++c)
+                        pixel[2 - c] = cv::saturate_cast<std::uint8_t>(
+                            o[c] > 0.0f ? 200.0f * w[c] / o[c] : 0.0f);
+                });
+                cv::imwrite((arguments.pictures / (room + "-" + name + "-ratio.png")).string(),
+                            ratio);
+            }
+        }
 }
 
 }  // namespace
@@ -288,30 +346,38 @@ void measure(std::filesystem::path folder, InsertOptions options, bool both)
 int main(int argc, char** argv)
 {
     CLI::App app("How close the whole chain comes to rooms in which the object really stood");
-    insitu::InsertOptions options;
+    insitu::Arguments arguments;
+    insitu::InsertOptions& options = arguments.options;
     options.render.max_samples = 32;
-    bool both = false;
-    std::string form = "ratio";
-    std::vector<std::filesystem::path> rooms;
     app.add_option("--samples", options.render.max_samples, "Most samples per pixel")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    app.add_flag("--both", both, "Also without the focal length in EXIF");
-    app.add_option("--form", form, "Composite form")
+    app.add_flag("--both", arguments.both, "Also without the focal length in EXIF (rows ...-l)");
+    app.add_option("--form", arguments.form, "Composite form")
         ->check(CLI::IsMember({"ratio", "difference"}))
         ->capture_default_str();
-    app.add_option("rooms", rooms, "Folders of truth rooms")->required();
+    app.add_option("--technique", arguments.techniques, "One or several")
+        ->check(CLI::IsMember({"reference", "fiv", "auto", "fiv-distant", "fiv-cube"}))
+        ->capture_default_str();
+    app.add_option("--max-error", options.render.target_error, "As in insert")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_option("--cache", options.cache_folder, "Folder that keeps light, layers and atlases");
+    app.add_option("--atlases", options.render.fiv.atlas_folder, "Folder that keeps atlases only");
+    app.add_option("--pictures", arguments.pictures, "Existing folder for the pictures");
+    app.add_option("rooms", arguments.rooms, "Folders of truth rooms")->required();
     CLI11_PARSE(app, argc, argv)
     options.render.min_samples = std::min(options.render.min_samples, options.render.max_samples);
-    options.composite.form =
-        form == "ratio" ? insitu::CompositeForm::Ratio : insitu::CompositeForm::Difference;
-    fmt::print("{} samples, {} form\n", options.render.max_samples, form);
+    options.composite.form = arguments.form == "ratio" ? insitu::CompositeForm::Ratio
+                                                       : insitu::CompositeForm::Difference;
+    fmt::print("{} samples, {} form\n", options.render.max_samples, arguments.form);
     fmt::print(
-        "room           focal   object  contact  shadow  far px  codes changed% seconds  render "
-        "samples  ratio se\n");
+        "room           technique    object  contact  shadow  far px  codes changed% seconds  "
+        "render "
+        "    cpu tables samples  ratio se fiv rms  upper\n");
     try {
-        for (const auto& room : rooms)
-            insitu::measure(room, options, both);
+        for (const auto& room : arguments.rooms)
+            insitu::measure(room, arguments);
     } catch (const std::exception& error) {
         fmt::print(stderr, "{}\n", error.what());
         return 1;

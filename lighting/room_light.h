@@ -109,6 +109,10 @@ public:
     /// Irradiance and Lambert reflectance of the surfaces, on the cell grid.
     [[nodiscard]] const FaceGrid<Rgb>& cellIrradiance() const { return cell_irradiance_; }
     [[nodiscard]] const FaceGrid<Rgb>& cellReflectance() const { return cell_reflectance_; }
+    /// Radiance of the surfaces, on the texel grid; texels in openings are not valid.
+    [[nodiscard]] const FaceGrid<Rgb>& surfaceRadiance() const { return radiance_; }
+    /// What lies beyond the openings, or everywhere where the proxy is missed.
+    [[nodiscard]] const EnvironmentMap& outside() const { return outside_; }
     [[nodiscard]] const Findings& findings() const { return findings_; }
 
 private:

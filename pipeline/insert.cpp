@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 
 namespace insitu {
 
@@ -24,13 +25,19 @@ public:
     void lap(const char* stage, bool from_cache = false)
     {
         const auto now = std::chrono::steady_clock::now();
-        times_.push_back({stage, std::chrono::duration<double>(now - last_).count(), from_cache});
+        const std::clock_t worked = std::clock();
+        times_.push_back({stage,
+                          std::chrono::duration<double>(now - last_).count(),
+                          static_cast<double>(worked - worked_) / CLOCKS_PER_SEC,
+                          from_cache});
         last_ = now;
+        worked_ = worked;
     }
 
 private:
     std::vector<StageTime>& times_;
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+    std::clock_t worked_ = std::clock();
 };
 
 Exposure merged(Exposure exif, const Exposure& given)
@@ -336,10 +343,14 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
         result.photo.image, result.photo_response, result.photo_relative_exposure, primaries);
     std::optional<PhotographedRadiance> photographed;
     if (result.light.radiance_unit_known) photographed = {camera, photo_radiance};
-    RenderStage stage{camera, proxy, result.light, photographed, options};
+    InsertOptions with_atlases = options;
+    if (options.render.fiv.atlas_folder.empty() && !options.cache_folder.empty())
+        with_atlases.render.fiv.atlas_folder = options.cache_folder / "atlas";
+    RenderStage stage{camera, proxy, result.light, photographed, with_atlases};
     RenderedStage rendered = stage.run(std::move(objects), cache, watch, progress);
     append(result.findings, std::move(rendered.light_findings));
     result.render = std::move(rendered.render);
+    append(result.findings, result.render.findings);
     matchLightToPhoto(photo_radiance, result.light.radiance_unit_known, result);
 
     for (const ProjectForeground& foreground : project.foreground)

@@ -29,6 +29,7 @@ struct InsertOptions {
 struct StageTime {
     std::string stage;
     double seconds = 0.0;
+    double processor_seconds = 0.0;  ///< of all threads
     bool from_cache = false;
 };
 

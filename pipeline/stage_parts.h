@@ -51,9 +51,15 @@ void parts(auto& archive, PartsOf<RenderLayers> auto& v)
     archive(v.object, v.alpha, v.irradiance_without, v.irradiance_with, v.depth_m);
     archive(v.object_variance, v.ratio_variance, v.probe_radiance);
 }
+void parts(auto& archive, PartsOf<SampledError> auto& v)
+{
+    archive(v.pixels, v.rms, v.upper);
+}
 void parts(auto& archive, PartsOf<InsertionResult> auto& v)
 {
-    archive(v.layers, v.mean_samples, v.stopped_by_time, v.ratio_error);
+    archive(v.fiv_error);
+    archive(v.layers, v.technique, v.mean_samples, v.stopped_by_time, v.ratio_error);
+    archive(v.table_bytes, v.table_seconds, v.table_processor_seconds, v.findings);
 }
 void parts(auto& archive, PartsOf<RenderedStage> auto& v)
 {
@@ -142,10 +148,21 @@ void parts(auto& archive, PartsOf<IrradianceFilterOptions> auto& v)
 {
     archive(v.levels, v.range_sigmas);
 }
+void parts(auto& archive, PartsOf<AtlasOptions> auto& v)
+{
+    archive(v.face_size, v.resolution, v.samples);
+}
+/// Where atlases are kept changes no picture.
+void parts(auto& archive, PartsOf<FivOptions> auto& v)
+{
+    archive(v.atlas, v.object_face_size, v.receiver_node_spacing_m, v.object_node_spacing_m);
+    archive(v.bias_texels, v.interpolation_tolerance, v.interreflection, v.light);
+    archive(v.object_samples);
+}
 void parts(auto& archive, PartsOf<InsertionOptions> auto& v)
 {
     archive(v.technique, v.max_samples, v.min_samples, v.target_error, v.max_seconds, v.seed);
-    archive(v.path, v.interreflection, v.filter);
+    archive(v.path, v.interreflection, v.filter, v.fiv);
 }
 static_assert(sizeof(ResponseOptions) == 24 && sizeof(MergeOptions) == 120);
 static_assert(sizeof(ChannelNoise) == 32 && sizeof(NoiseModel) == 96);
@@ -153,6 +170,7 @@ static_assert(sizeof(AlignmentOptions) == 32 && sizeof(DeghostOptions) == 24);
 static_assert(sizeof(CaptureOptions) == 208);
 static_assert(sizeof(RoomLightOptions) == 56 && sizeof(PathOptions) == 8);
 static_assert(sizeof(InterreflectionOptions) == 24 && sizeof(IrradianceFilterOptions) == 16);
-static_assert(sizeof(InsertionOptions) == 88);
+static_assert(sizeof(AtlasOptions) == 12 && sizeof(FivOptions) == 104);
+static_assert(sizeof(InsertionOptions) == 192);
 
 }  // namespace insitu

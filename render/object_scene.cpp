@@ -170,6 +170,11 @@ bool ObjectScene::empty() const
     return impl_->rays->empty();
 }
 
+const std::vector<ObjectScene::Object>& ObjectScene::objects() const
+{
+    return impl_->objects;
+}
+
 const std::vector<BoundingBox>& ObjectScene::bounds() const
 {
     return impl_->bounds;

@@ -34,6 +34,7 @@ public:
     ObjectScene(ObjectScene&&) noexcept;
 
     [[nodiscard]] bool empty() const;
+    [[nodiscard]] const std::vector<Object>& objects() const;
     /// Axis-aligned bounds of one object, for bounding cones.
     [[nodiscard]] const std::vector<BoundingBox>& bounds() const;
     /// Alpha-masked texels let rays pass; a single-sided back face is shaded like a front face.

@@ -1,7 +1,8 @@
+#include "render/reference_renderer.h"
+
 #include "core/color.h"
 #include "core/parallel.h"
 #include "lighting/see_through.h"
-#include "render/renderer.h"
 
 #include <algorithm>
 #include <atomic>
@@ -159,16 +160,6 @@ Image<std::uint8_t> noisyPixels(const std::vector<PixelSums>& sums,
     return grown;
 }
 
-RenderLayers emptyLayers(int width, int height)
-{
-    RenderLayers layers;
-    layers.object = layers.irradiance_without = layers.irradiance_with = layers.probe_radiance =
-        Image<Rgb>(width, height);
-    layers.alpha = layers.depth_m = layers.object_variance = layers.ratio_variance =
-        Image<float>(width, height);
-    return layers;
-}
-
 void store(const PixelSums& sums, int x, int y, RenderLayers& layers)
 {
     layers.object(x, y) = Rgb(sums.object / static_cast<double>(sums.count));
@@ -219,33 +210,12 @@ void storeIrradiance(const std::vector<PixelSums>& sums,
 
 }  // namespace
 
-Findings InsertionOptions::validate() const
-{
-    Findings findings;
-    const auto demand = [&](bool holds, const char* message) {
-        if (!holds) findings.push_back({Severity::Error, "option-out-of-range", message});
-    };
-    demand(max_samples > 0, "max_samples must be > 0");
-    demand(min_samples > 0 && min_samples <= max_samples,
-           "min_samples must be in [1, max_samples]");
-    demand(target_error >= 0.0, "target_error must be >= 0");
-    demand(max_seconds >= 0.0, "max_seconds must be >= 0");
-    demand(path.max_bounces >= 1, "path.max_bounces must be >= 1");
-    demand(path.roulette_start >= 0, "path.roulette_start must be >= 0");
-    demand(interreflection.rounds >= 0, "interreflection.rounds must be >= 0");
-    demand(interreflection.samples_per_cell > 0, "interreflection.samples_per_cell must be > 0");
-    demand(filter.levels >= 0 && filter.levels <= 10, "filter.levels must be in [0, 10]");
-    demand(filter.range_sigmas > 0.0, "filter.range_sigmas must be > 0");
-    return findings;
-}
-
-InsertionResult renderInsertion(const Camera& camera,
+InsertionResult renderReference(const Camera& camera,
                                 const RoomLight& room,
                                 const ObjectScene& objects,
                                 const InsertionOptions& options,
                                 Progress& progress)
 {
-    requireValid(options.validate(), "render options");
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
     const auto outOfTime = [&] {
@@ -306,6 +276,38 @@ InsertionResult renderInsertion(const Camera& camera,
     result.mean_samples = samples / (static_cast<double>(width) * height);
     result.ratio_error = receivers > 0.0 ? std::sqrt(variance / receivers) : 0.0;
     return result;
+}
+
+std::vector<PixelEstimate> referencePixels(const Camera& camera,
+                                           const RoomLight& room,
+                                           const ObjectScene& objects,
+                                           const InsertionOptions& options,
+                                           std::span<const glm::ivec2> pixels,
+                                           int samples,
+                                           Progress& progress)
+{
+    const RoomWithObjects scene(room, objects, options.interreflection, progress);
+    const PixelSampler sampler(camera, scene, options);
+    std::vector<PixelEstimate> estimates(pixels.size());
+    parallelFor(0, static_cast<std::int64_t>(pixels.size()), [&](std::int64_t number) {
+        const std::size_t i = static_cast<std::size_t>(number);
+        PixelSums sums;
+        while (sums.count < samples && !progress.cancelled())
+            sampler.add(pixels[i].x, pixels[i].y, sums);
+        PixelEstimate& estimate = estimates[i];
+        if (sums.covered > 0) {
+            const double share = static_cast<double>(sums.covered) / sums.count;
+            estimate.object = luminance(Rgb(sums.object / static_cast<double>(sums.covered)));
+            estimate.object_variance = sums.objectVariance() / (share * share);
+        }
+        const double base = luminance(Rgb(sums.without));
+        if (sums.receivers > 0 && base > 0.0) {
+            estimate.change = sums.change / base;
+            estimate.change_variance = sums.ratioVariance();
+        }
+    });
+    progress.checkpoint();
+    return estimates;
 }
 
 }  // namespace insitu

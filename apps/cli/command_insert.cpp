@@ -32,6 +32,7 @@ void runInsert(InsertArguments& arguments, Context& context)
     options.light.seed = context.options.seed;
     options.render.interreflection.seed = context.options.seed;
     options.render.min_samples = std::min(options.render.min_samples, options.render.max_samples);
+    options.render.technique = arguments.technique == "fiv" ? Technique::Fiv : Technique::Reference;
     options.composite.form =
         arguments.form == "ratio" ? CompositeForm::Ratio : CompositeForm::Difference;
     options.use_exif_focal = !arguments.ignore_exif_focal;
@@ -69,16 +70,22 @@ void registerInsert(CLI::App& app, Context& context)
     command->add_option("--hdr", arguments->hdr, "Also write the linear composite (.exr, .hdr)");
     command->add_option("--layers", arguments->layers, "Also write all layers (.exr)");
     command->add_option("--report", arguments->report, "Also write findings and figures (.json)");
-    command->add_option("--technique", arguments->technique, "How light is computed: reference")
-        ->check(CLI::IsMember({"reference"}))
+    command
+        ->add_option("--technique",
+                     arguments->technique,
+                     "How light is computed: reference (paths, noisy, slow) or fiv (visibility "
+                     "atlas and local light: no noise, a little bias, many times as quick) or auto "
+                     "(fiv if sampled pixels show that it keeps "
+                     "--max-error)")
+        ->check(CLI::IsMember({"reference", "fiv", "auto"}))
         ->capture_default_str();
     command
         ->add_option("--max-error",
                      render.target_error,
-                     "Standard error of the light at which a pixel is done, relative")
+                     "Relative error of the light: reference stops at it, auto asks it of fiv")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
-    command->add_option("--samples", render.max_samples, "Most samples per pixel")
+    command->add_option("--samples", render.max_samples, "Most samples per pixel (reference)")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     command
@@ -102,7 +109,7 @@ void registerInsert(CLI::App& app, Context& context)
     context.addCommonOptions(*command);
     command->footer(
         "Examples:\n"
-        "  insitu insert project.json -o final.png\n"
+        "  insitu insert project.json -o final.png --technique auto --max-error 0.03\n"
         "  insitu insert project.json -o final.png --hdr final.exr --report report.json "
         "--max-error 0.002");
     command->callback([arguments, &context] { runInsert(*arguments, context); });

@@ -1,0 +1,173 @@
+#include "render/fiv/fiv_renderer.h"
+
+#include "render/fiv/object_light.h"
+#include "render/fiv/object_pixels.h"
+#include "render/fiv/receiver_pixels.h"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+
+namespace insitu {
+
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// All objects as one mesh, for the atlas.
+TriangleMesh merged(const ObjectScene& objects)
+{
+    TriangleMesh all;
+    for (const ObjectScene::Object& object : objects.objects()) {
+        const TriangleMesh& mesh = object.model.mesh;
+        const auto base = static_cast<std::uint32_t>(all.positions.size());
+        all.positions.insert(all.positions.end(), mesh.positions.begin(), mesh.positions.end());
+        for (const glm::uvec3& triangle : mesh.triangles)
+            all.triangles.push_back(triangle + base);
+    }
+    return all;
+}
+
+/// Several objects share an atlas that spans them all: as fine for each as for one, within bounds.
+int sharedResolution(const ObjectScene& objects, int resolution)
+{
+    double largest = 0.0;
+    BoundingBox all = objects.bounds().front();
+    for (const BoundingBox& b : objects.bounds()) {
+        largest = std::max(largest, glm::length(b.max - b.min));
+        all = {glm::min(all.min, b.min), glm::max(all.max, b.max)};
+    }
+    if (!(largest > 0.0)) return resolution;
+    const double growth = std::min(glm::length(all.max - all.min) / largest, 2.0);
+    return std::min(static_cast<int>(resolution * growth), 512);
+}
+
+VisibilityAtlas atlasOf(const TriangleMesh& mesh,
+                        const AtlasOptions& options,
+                        const FivOptions& fiv,
+                        InsertionResult& result,
+                        Progress& progress)
+{
+    CachedAtlas cached;
+    if (fiv.atlas_folder.empty())
+        cached.atlas = buildVisibilityAtlas(mesh, options, progress);
+    else
+        cached = cachedVisibilityAtlas(mesh, options, fiv.atlas_folder, progress);
+    append(result.findings, cached.findings);
+    result.table_bytes += cached.atlas.silhouettes.memoryBytes();
+    return std::move(cached.atlas);
+}
+
+FivScene makeScene(const RoomLight& room,
+                   const ObjectScene& objects,
+                   const FivOptions& fiv,
+                   InsertionResult& result,
+                   Progress& progress)
+{
+    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t worked = std::clock();
+    const TriangleMesh mesh = merged(objects);
+    AtlasOptions fine = fiv.atlas;
+    fine.resolution = sharedResolution(objects, fine.resolution);
+    AtlasOptions coarse = fine;
+    coarse.face_size = fiv.object_face_size;
+    FivScene scene{room,
+                   objects,
+                   atlasOf(mesh, fine, fiv, result, progress),
+                   atlasOf(mesh, coarse, fiv, result, progress),
+                   {},
+                   {},
+                   {},
+                   fiv.light,
+                   room.cellIrradiance(),
+                   {}};
+    result.table_seconds = secondsSince(start);
+    result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
+    scene.cells = std::make_shared<CellGeometry>(scene.atlas.cells());
+    scene.coarse_cells = std::make_shared<CellGeometry>(scene.coarse.cells());
+    scene.spots = LightSpots(room, scene.frame().center, LightSpotOptions{});
+    for (std::size_t i = 0; i < scene.room_change.size(); ++i)
+        scene.room_change[i] = Rgb(0.0f);
+    scene.glow.assign(2 * scene.coarse.cells().pairCount(), Rgb(0.0f));
+    return scene;
+}
+
+/// What the objects send to each other and to the room, and what the room sends back: the objects'
+/// mean radiance, twice, then the room's change, then the objects again in the changed room.
+void lightEachOther(FivScene& scene,
+                    ObjectShading& shading,
+                    const FivOptions& fiv,
+                    Progress& progress)
+{
+    const std::vector<ObjectSample> samples = sampleObjects(scene.objects, fiv.object_samples);
+    std::vector<ObjectShading::Place> places;
+    for (const ObjectSample& sample : samples)
+        places.push_back(
+            {sample.point.position, sample.point.geometric_normal, sample.point.geometric_normal});
+    for (int round = 0; round < 3; ++round) {
+        if (round == 2) scene.room_change = roomChange(scene);
+        if (round > 0) shading.update(/*room_too=*/round == 2);
+        scene.glow = glowOf(scene, samples, shading.receive(places));
+        progress.checkpoint();
+    }
+    shading.update(/*room_too=*/false);
+}
+
+/// Nothing stands in the room: with is without.
+void emptyRoom(const Camera& camera, const RoomLight& room, RenderLayers& layers)
+{
+    for (int y = 0; y < camera.height; ++y)
+        for (int x = 0; x < camera.width; ++x) {
+            const auto hit =
+                room.proxy().intersect(camera.position_m, camera.rayDirection({x + 0.5, y + 0.5}));
+            if (!hit || hit->opening) continue;
+            layers.irradiance_without(x, y) = layers.irradiance_with(x, y) =
+                room.irradianceScale(hit->face, hit->uv) *
+                room.cellIrradiance().lookUp(hit->face, hit->uv, Rgb(0.0f));
+            layers.probe_radiance(x, y) = room.probeRadiance(hit->face, hit->uv);
+        }
+}
+
+}  // namespace
+
+InsertionResult renderFiv(const Camera& camera,
+                          const RoomLight& room,
+                          const ObjectScene& objects,
+                          const InsertionOptions& options,
+                          Progress& progress)
+{
+    InsertionResult result;
+    result.technique = Technique::Fiv;
+    result.layers = emptyLayers(camera.width, camera.height);
+    if (objects.empty()) {
+        emptyRoom(camera, room, result.layers);
+        return result;
+    }
+    for (const ObjectScene::Object& object : objects.objects())
+        for (const Material& material : object.model.materials)
+            if (material.alpha_mask && !hasFinding(result.findings, "fiv-cut-outs-are-solid"))
+                result.findings.push_back(
+                    {Severity::Warning,
+                     "fiv-cut-outs-are-solid",
+                     "technique fiv sees cut-out materials as solid when it computes shadows: they "
+                     "are too dark; technique reference sees the holes"});
+
+    const FivOptions& fiv = options.fiv;
+    FivScene scene = makeScene(room, objects, fiv, result, progress);
+    ObjectShading shading(scene, {fiv.object_node_spacing_m, fiv.bias_texels});
+    if (fiv.interreflection) lightEachOther(scene, shading, fiv, progress);
+    progress.report("fiv", 0.3);
+
+    const auto receivers = renderObjectPixels(camera, scene, shading, result.layers, progress);
+    progress.report("fiv", 0.6);
+    ReceiverLight light(scene, fiv.receiver_node_spacing_m);
+    result.mean_samples = renderReceiverPixels(
+        scene, receivers, light, fiv.interpolation_tolerance, result.layers, progress);
+    progress.report("fiv", 1.0);
+    return result;
+}
+
+}  // namespace insitu

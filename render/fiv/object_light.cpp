@@ -1,0 +1,373 @@
+#include "render/fiv/object_light.h"
+
+#include "core/color.h"
+#include "core/parallel.h"
+#include "render/bsdf/bsdf.h"
+#include "render/bsdf/ggx_albedo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace insitu {
+
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr int kMaxNodesAlong = 6;
+constexpr int kIrradianceCube = 8;
+constexpr int kGlossyCube = 16;
+/// Roughnesses of the tables of glossy light, 0 to 1.
+constexpr int kGlossyLevels = 5;
+/// Surfaces smoother than this are mirrors whose reflected ray is followed.
+constexpr float kSmooth = 0.25f;
+/// Share of hidden light beyond which the open light is not known from the mean.
+constexpr float kMostGain = 4.0f;
+
+/// Metal of this base colour, times `scale`, has the same glossy lobe.
+struct GlossyLobe {
+    SurfaceMaterial metal;
+    float scale = 0.0f;
+};
+GlossyLobe glossyLobe(const SurfaceMaterial& m)
+{
+    const float f90 = glm::mix(m.specular, 1.0f, m.metallic);
+    GlossyLobe lobe;
+    lobe.scale = f90;
+    lobe.metal = m;
+    lobe.metal.metallic = 1.0f;
+    if (f90 > 0.0f)
+        lobe.metal.base_color =
+            glm::mix(glm::vec3(0.04f * m.specular), m.base_color, m.metallic) / f90;
+    return lobe;
+}
+
+/// What of diffuse light the base reflects: a coat lets less through at grazing views.
+Rgb diffuseReflectance(const SurfaceMaterial& m, double cosine)
+{
+    Rgb base = m.base_color * (1.0f - m.metallic);
+    if (m.specular > 0.0f && m.metallic < 1.0f)
+        base *= static_cast<float>(
+            1.0 - ggx::directionalAlbedo(m.roughness, cosine).of(0.04 * m.specular, m.specular));
+    return base;
+}
+
+/// What of even light the surface reflects in all.
+Rgb reflectance(const SurfaceMaterial& m)
+{
+    const GlossyLobe lobe = glossyLobe(m);
+    const ggx::Albedo albedo = ggx::meanAlbedo(m.roughness);
+    const Rgb f0 = lobe.metal.base_color;
+    const Rgb glossy = isGlossy(m) ? lobe.scale * (f0 * static_cast<float>(albedo.at_f0) +
+                                                   static_cast<float>(albedo.at_f90))
+                                   : Rgb(0.0f);
+    return m.base_color * (1.0f - m.metallic) * (1.0f - luminance(glossy) * (1.0f - m.metallic)) +
+           glossy;
+}
+
+}  // namespace
+
+ObjectShading::ObjectShading(const FivScene& scene, const ObjectLightOptions& options)
+    : scene_(scene), options_(options)
+{
+    for (const ObjectScene::Object& object : scene.objects.objects())
+        for (const Material& m : object.model.materials)
+            any_glossy_ = any_glossy_ || m.specular > 0.0f || m.metallic > 0.0f;
+    lookFromNodes(options.node_spacing_m);
+    update(/*room_too=*/true);
+}
+
+void ObjectShading::update(bool room_too)
+{
+    if (room_too) {
+        parallelFor(0, static_cast<std::int64_t>(lights_.size()), [&](std::int64_t number) {
+            PlaceLight& light = lights_[static_cast<std::size_t>(number)];
+            light.setChange(scene_.room_change);
+            nodes_[static_cast<std::size_t>(number)] = irradianceCube(light, kIrradianceCube);
+        });
+        mean_ = lights_.front();
+        for (std::size_t cell = 0; cell < mean_.radiance.size(); ++cell) {
+            for (std::size_t i = 1; i < lights_.size(); ++i) {
+                mean_.radiance[cell] += lights_[i].radiance[cell];
+                mean_.change[cell] += lights_[i].change[cell];
+            }
+            mean_.radiance[cell] /= static_cast<float>(lights_.size());
+            mean_.change[cell] /= static_cast<float>(lights_.size());
+        }
+        mean_irradiance_ = irradianceCube(mean_, kIrradianceCube);
+        if (any_glossy_) {
+            glossy_.resize(kGlossyLevels);
+            parallelFor(0, kGlossyLevels, [&](std::int64_t level) {
+                glossy_[static_cast<std::size_t>(level)] = glossyCube(
+                    mean_, static_cast<double>(level) / (kGlossyLevels - 1), kGlossyCube);
+            });
+        }
+    }
+    hideable_ = hideableLight(scene_, scene_.coarse, mean_);
+}
+
+void ObjectShading::lookFromNodes(double spacing_m)
+{
+    const std::vector<BoundingBox>& bounds = scene_.objects.bounds();
+    box_ = bounds.front();
+    for (const BoundingBox& b : bounds)
+        box_ = {glm::min(box_.min, b.min), glm::max(box_.max, b.max)};
+    // Objects stand on surfaces: their light is looked at from just above these.
+    const glm::dvec3 size = box_.max - box_.min;
+    const glm::dvec3 inset = glm::min(0.1 * size, glm::dvec3(0.02));
+    box_ = {box_.min + inset, box_.max - inset};
+    for (int axis = 0; axis < 3; ++axis)
+        node_count_[axis] =
+            std::clamp(static_cast<int>(std::ceil(size[axis] / spacing_m)) + 1, 2, kMaxNodesAlong);
+
+    const glm::dvec3 center = 0.5 * (box_.min + box_.max);
+    const std::size_t count =
+        static_cast<std::size_t>(node_count_.x * node_count_.y * node_count_.z);
+    nodes_.resize(count);
+    lights_.resize(count);
+    parallelFor(0, static_cast<std::int64_t>(count), [&](std::int64_t number) {
+        const int n = static_cast<int>(number);
+        const glm::ivec3 at(n % node_count_.x,
+                            n / node_count_.x % node_count_.y,
+                            n / (node_count_.x * node_count_.y));
+        const glm::dvec3 inside = glm::dvec3(at) / glm::dvec3(node_count_ - 1);
+        glm::dvec3 place = glm::mix(box_.min, box_.max, inside);
+        // A place beyond a wall looks from before it.
+        const glm::dvec3 way = place - center;
+        const double length = glm::length(way);
+        if (length > 0.0) {
+            const auto wall = scene_.room.intersect(center, way / length);
+            if (wall && wall->distance_m < length + 0.01)
+                place = center + way / length * std::max(0.0, wall->distance_m - 0.02);
+        }
+        if (scene_.light != FivLight::Room) place = scene_.frame().center;
+        lights_[static_cast<std::size_t>(number)] =
+            lookAround(scene_.room, scene_.spots, place, scene_.coarse_cells);
+    });
+}
+
+Rgb ObjectShading::openIrradiance(const Place& place) const
+{
+    const glm::dvec3 size = glm::max(box_.max - box_.min, glm::dvec3(1e-12));
+    const glm::dvec3 at =
+        glm::clamp((place.position - box_.min) / size, glm::dvec3(0.0), glm::dvec3(1.0)) *
+        glm::dvec3(node_count_ - 1);
+    const glm::ivec3 low = glm::min(glm::ivec3(at), node_count_ - 2);
+    const glm::vec3 t(at - glm::dvec3(low));
+    Rgb sum(0.0f);
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::ivec3 step(corner & 1, (corner >> 1) & 1, corner >> 2);
+        const glm::vec3 w = glm::mix(1.0f - t, t, glm::vec3(step));
+        const float weight = w.x * w.y * w.z;
+        if (weight <= 0.0f) continue;
+        const glm::ivec3 n = low + step;
+        const auto number =
+            static_cast<std::size_t>((n.z * node_count_.y + n.y) * node_count_.x + n.x);
+        sum += weight * nodes_[number].lookUp(place.normal);
+    }
+    return sum;
+}
+
+Rgb ObjectShading::spotIrradiance(const Place& place) const
+{
+    glm::dvec3 sum(0.0);
+    SurfacePoint point;
+    point.position = place.position;
+    point.geometric_normal = place.geometric_normal;
+    const glm::dvec3 start = scene_.objects.leave(point, place.geometric_normal);
+    for (const LightSpot& spot : scene_.spots.spots()) {
+        const glm::dvec3 toward = spot.far ? spot.at : spot.at - start;
+        if (glm::dot(toward, place.normal) <= 0.0 ||
+            glm::dot(toward, place.geometric_normal) <= 0.0)
+            continue;
+        const auto arriving = reach(scene_.room, spot, start);
+        if (!arriving ||
+            (scene_.light != FivLight::Cube &&
+             scene_.objects.occluded(start, arriving->direction, arriving->distance_m)))
+            continue;
+        sum += arriving->irradiance * glm::dot(arriving->direction, place.normal);
+    }
+    return Rgb(sum);
+}
+
+std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Place> places) const
+{
+    std::vector<glm::vec3> local(places.size());
+    std::vector<glm::vec3> normals(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        local[i] = scene_.frame().localFrom(places[i].position);
+        normals[i] = glm::vec3(places[i].normal);
+    }
+    std::vector<Rgb> lost(places.size(), Rgb(0.0f));
+    std::vector<Rgb> gained(places.size(), Rgb(0.0f));
+    const bool hides = scene_.light != FivLight::Cube;
+    if (hides) hiddenIrradiance(hideable_.lost, local, normals, lost, options_.bias_texels);
+    if (hides && hideable_.gains)
+        hiddenIrradiance(hideable_.gained, local, normals, gained, options_.bias_texels);
+    std::vector<Received> result(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        const Rgb all = mean_irradiance_.lookUp(places[i].normal);
+        const Rgb left = glm::max(all - lost[i] + gained[i], Rgb(0.0f));
+        const Rgb open = openIrradiance(places[i]);
+        Received& r = result[i];
+        // Where the mean light brings nothing, what was gained is all there is.
+        for (int c = 0; c < 3; ++c)
+            r.smooth[c] = all[c] > 0.0f ? open[c] * std::min(left[c] / all[c], kMostGain) : left[c];
+        const float level = luminance(all);
+        r.open = level > 0.0f ? std::clamp(luminance(left) / level, 0.0f, 1.0f) : 1.0f;
+        if (!scene_.spots.spots().empty()) r.spots = spotIrradiance(places[i]);
+    }
+    return result;
+}
+
+Rgb ObjectShading::mirrored(const SurfacePoint& point, glm::dvec3 direction) const
+{
+    const glm::dvec3 start = scene_.objects.leave(point, direction);
+    const RoomLight::Arrival arrival = scene_.room.arrive(start, direction);
+    if (scene_.mayMeetObjects(start, direction) &&
+        scene_.objects.occluded(start, direction, arrival.light.distance_m))
+        return scene_.glowAlong(direction);
+    Rgb radiance = arrival.light.radiance;
+    if (arrival.hit && !arrival.hit->opening)
+        radiance += scene_.room_change.lookUp(arrival.hit->face, arrival.hit->uv, Rgb(0.0f));
+    return glm::max(radiance, Rgb(0.0f));
+}
+
+Rgb ObjectShading::glossy(const SurfacePoint& point, glm::dvec3 wo, const Received& received) const
+{
+    const GlossyLobe lobe = glossyLobe(point.material);
+    const glm::dvec3 normal = point.shading_normal;
+    const double cosine = std::max(glm::dot(normal, wo), 0.0);
+    const ggx::Albedo albedo = ggx::directionalAlbedo(point.material.roughness, cosine);
+    const Rgb reflected = lobe.scale * (lobe.metal.base_color * static_cast<float>(albedo.at_f0) +
+                                        static_cast<float>(albedo.at_f90));
+    const glm::dvec3 mirror = glm::reflect(-wo, normal);
+    const float roughness = std::clamp(point.material.roughness, 0.0f, 1.0f);
+    if (roughness < kSmooth) return reflected * mirrored(point, mirror);
+
+    const float level = roughness * (kGlossyLevels - 1);
+    const int below = std::min(static_cast<int>(level), kGlossyLevels - 2);
+    const Rgb smooth = glm::mix(glossy_[static_cast<std::size_t>(below)].lookUp(mirror),
+                                glossy_[static_cast<std::size_t>(below) + 1].lookUp(mirror),
+                                level - static_cast<float>(below));
+    Rgb sum = reflected * smooth * received.open;
+    if (received.spots == Rgb(0.0f)) return sum;
+    // The light of spots one by one; what of it is hidden is taken from the irradiance.
+    Rgb all(0.0f);
+    Rgb shining(0.0f);
+    for (const LightSpot& spot : scene_.spots.spots()) {
+        const auto arriving = reach(scene_.room, spot, point.position);
+        if (!arriving) continue;
+        const double c = glm::dot(arriving->direction, normal);
+        if (c <= 0.0) continue;
+        const Rgb irradiance(arriving->irradiance * c);
+        all += irradiance;
+        shining +=
+            lobe.scale * evaluateBsdf(lobe.metal, normal, wo, arriving->direction) * irradiance;
+    }
+    for (int c = 0; c < 3; ++c)
+        if (all[c] > 0.0f) sum[c] += shining[c] * std::min(1.0f, received.spots[c] / all[c]);
+    return sum;
+}
+
+Rgb ObjectShading::radiance(const SurfacePoint& point,
+                            glm::dvec3 wo,
+                            const Received& received) const
+{
+    const double cosine = std::abs(glm::dot(point.shading_normal, wo));
+    Rgb sum = point.material.emissive +
+              diffuseReflectance(point.material, cosine) * (received.smooth + received.spots) / kPi;
+    if (isGlossy(point.material)) sum += glossy(point, wo, received);
+    return sum;
+}
+
+std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
+{
+    struct Piece {
+        std::size_t object = 0;
+        std::size_t triangle = 0;
+    };
+    std::vector<Piece> pieces;
+    std::vector<double> areas;
+    double total = 0.0;
+    for (std::size_t o = 0; o < objects.objects().size(); ++o) {
+        const TriangleMesh& mesh = objects.objects()[o].model.mesh;
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+            const glm::uvec3 corner = mesh.triangles[t];
+            const glm::dvec3 a(mesh.positions[corner.x]);
+            total += 0.5 * glm::length(glm::cross(glm::dvec3(mesh.positions[corner.y]) - a,
+                                                  glm::dvec3(mesh.positions[corner.z]) - a));
+            areas.push_back(total);
+            pieces.push_back({o, t});
+        }
+    }
+    std::vector<ObjectSample> samples;
+    if (!(total > 0.0)) return samples;
+    const auto fraction = [](double value) { return value - std::floor(value); };
+    for (int i = 0; i < count; ++i) {
+        const double wanted = (i + 0.5) / count * total;
+        const auto found = std::lower_bound(areas.begin(), areas.end(), wanted);
+        const Piece piece = pieces[static_cast<std::size_t>(
+            std::min(found - areas.begin(), static_cast<std::ptrdiff_t>(areas.size()) - 1))];
+        const TriangleMesh& mesh = objects.objects()[piece.object].model.mesh;
+        const glm::uvec3 corner = mesh.triangles[piece.triangle];
+        const glm::dvec3 a(mesh.positions[corner.x]);
+        const glm::dvec3 u = glm::dvec3(mesh.positions[corner.y]) - a;
+        const glm::dvec3 v = glm::dvec3(mesh.positions[corner.z]) - a;
+        const glm::dvec3 across = glm::cross(u, v);
+        if (!(glm::length(across) > 0.0)) continue;
+        // Additive recurrence with the plastic number.
+        double s = fraction(0.5 + 0.7548776662466927 * i);
+        double t = fraction(0.5 + 0.5698402909980532 * i);
+        if (s + t > 1.0) {
+            s = 1.0 - s;
+            t = 1.0 - t;
+        }
+        const glm::dvec3 place = a + s * u + t * v;
+        const glm::dvec3 normal = glm::normalize(across);
+        const double off = 1e-4 * std::sqrt(total);
+        for (const double side : {1.0, -1.0}) {
+            const auto point =
+                objects.intersect(place + side * off * normal, -side * normal, 2.0 * off);
+            if (point) samples.push_back({*point, total / count});
+        }
+    }
+    return samples;
+}
+
+std::vector<Rgb> glowOf(const FivScene& scene,
+                        std::span<const ObjectSample> samples,
+                        std::span<const ObjectShading::Received> received)
+{
+    const SilhouetteSet& set = scene.coarse.silhouettes;
+    const std::size_t pairs = scene.coarse.cells().pairCount();
+    std::vector<Rgb> sent(samples.size());
+    std::vector<glm::vec3> local(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const SurfaceMaterial& m = samples[i].point.material;
+        sent[i] = m.emissive + reflectance(m) * (received[i].smooth + received[i].spots) / kPi;
+        local[i] = scene.frame().localFrom(samples[i].point.position);
+    }
+    std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
+    parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
+        const std::size_t pair = static_cast<std::size_t>(number);
+        glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
+        double weights[2] = {0.0, 0.0};
+        for (std::size_t i = 0; i < samples.size(); ++i) {
+            const double cosine = glm::dot(samples[i].point.geometric_normal, set.directions[pair]);
+            // What faces ω is seen by those who look along −ω.
+            const int side = cosine > 0.0 ? 1 : 0;
+            const HiddenShares shares = hiddenShares(set, pair, local[i], 1.5f);
+            const double hidden = cosine > 0.0 ? shares.along : shares.against;
+            const double weight = std::abs(cosine) * (1.0 - hidden) * samples[i].area;
+            sums[side] += weight * glm::dvec3(sent[i]);
+            weights[side] += weight;
+        }
+        for (int side = 0; side < 2; ++side)
+            if (weights[side] > 0.0)
+                glow[2 * pair + static_cast<std::size_t>(side)] = Rgb(sums[side] / weights[side]);
+    });
+    return glow;
+}
+
+}  // namespace insitu

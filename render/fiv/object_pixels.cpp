@@ -1,0 +1,199 @@
+#include "render/fiv/object_pixels.h"
+
+#include "core/parallel.h"
+#include "lighting/see_through.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace insitu {
+
+namespace {
+
+constexpr int kTile = 64;
+/// Rays of every pixel that may show an object, and those added where it shows something else too.
+constexpr int kInner = 4;
+constexpr int kAll = 16;
+/// Points of one pixel share their irradiance when their normals are nearer than this cosine and
+/// their distances than this share.
+constexpr double kSameNormal = 0.95;
+constexpr double kSameDistance = 0.01;
+
+/// Rotated grid of 4, then the other places of a grid of 16 that has them.
+glm::dvec2 subPixel(int i)
+{
+    constexpr std::array<int, kAll> kOrder = {1, 7, 8, 14, 0, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 15};
+    const int cell = kOrder[static_cast<std::size_t>(i)];
+    return {(cell % 4 + 0.5) / 4.0, (cell / 4 + 0.5) / 4.0};
+}
+
+/// Points of objects in one pixel that are shaded, and the places in a tile's list that light them.
+struct PixelPoints {
+    glm::ivec2 pixel{0};
+    std::vector<SurfacePoint> points;
+    std::vector<glm::dvec3> toward_camera;
+    std::vector<std::size_t> place;  ///< one a point
+    float alpha = 0.0f;
+};
+
+class Tracer {
+public:
+    Tracer(const Camera& camera, const FivScene& scene) : camera_(camera), scene_(scene) {}
+
+    [[nodiscard]] std::optional<ProxyHit> surface(glm::ivec2 pixel, glm::dvec3 direction) const
+    {
+        const RoomLight& room = scene_.room;
+        return room.seesThrough(pixel.x, pixel.y)
+                   ? intersectBehindBoxes(room.proxy(), camera_.position_m, direction)
+                   : room.proxy().intersect(camera_.position_m, direction);
+    }
+    [[nodiscard]] glm::dvec3 direction(glm::ivec2 pixel, glm::dvec2 inside) const
+    {
+        return camera_.rayDirection(glm::dvec2(pixel) + inside);
+    }
+    [[nodiscard]] std::optional<SurfacePoint> object(glm::dvec3 direction,
+                                                     const std::optional<ProxyHit>& surface) const
+    {
+        if (!scene_.mayMeetObjects(camera_.position_m, direction)) return std::nullopt;
+        return scene_.objects.intersect(
+            camera_.position_m, direction, surface ? surface->distance_m : kInfinity);
+    }
+    static void keep(const std::optional<ProxyHit>& surface, std::optional<ReceiverPlace>& receiver)
+    {
+        if (surface && !surface->opening && !receiver)
+            receiver = {surface->point, surface->normal, surface->face, surface->uv};
+    }
+
+    /// Fills `seen` and `receiver`; false when no object is seen.
+    bool trace(glm::ivec2 pixel,
+               PixelPoints& seen,
+               float& depth_m,
+               std::optional<ReceiverPlace>& receiver) const
+    {
+        const glm::dvec3 middle = direction(pixel, glm::dvec2(0.5));
+        const auto behind = surface(pixel, middle);
+        // The bounding sphere with some room for the pixel's own size.
+        if (!scene_.mayMeetObjects(camera_.position_m, middle) &&
+            !scene_.mayMeetObjects(camera_.position_m, direction(pixel, {0.0, 0.0})) &&
+            !scene_.mayMeetObjects(camera_.position_m, direction(pixel, {1.0, 1.0}))) {
+            keep(behind, receiver);
+            return false;
+        }
+        double nearest = kInfinity;
+        int covered = 0;
+        int rays = kInner;
+        for (int i = 0; i < rays; ++i) {
+            const glm::dvec3 toward = direction(pixel, subPixel(i));
+            const auto wall = surface(pixel, toward);
+            const auto point = object(toward, wall);
+            if (point) {
+                ++covered;
+                nearest = std::min(nearest, point->distance_m);
+                if (i < kInner || seen.points.empty()) {
+                    seen.points.push_back(*point);
+                    seen.toward_camera.push_back(-toward);
+                }
+            } else {
+                keep(wall, receiver);
+            }
+            if (i + 1 == kInner && covered > 0 && covered < kInner) rays = kAll;
+        }
+        if (covered == 0) {
+            receiver.reset();
+            keep(behind, receiver);
+            return false;
+        }
+        seen.pixel = pixel;
+        seen.alpha = static_cast<float>(covered) / static_cast<float>(rays);
+        depth_m = static_cast<float>(nearest);
+        return true;
+    }
+
+private:
+    const Camera& camera_;
+    const FivScene& scene_;
+};
+
+ObjectShading::Place placeOf(const SurfacePoint& point)
+{
+    return {point.position, point.shading_normal, point.geometric_normal};
+}
+
+/// Points that lie on one smooth piece of surface are lit as their mean.
+void listPlaces(PixelPoints& pixel, std::vector<ObjectShading::Place>& places)
+{
+    const SurfacePoint& first = pixel.points.front();
+    ObjectShading::Place mean = placeOf(first);
+    bool together = true;
+    for (std::size_t i = 1; i < pixel.points.size() && together; ++i) {
+        const SurfacePoint& point = pixel.points[i];
+        together = point.object == first.object &&
+                   glm::dot(point.shading_normal, first.shading_normal) > kSameNormal &&
+                   glm::dot(point.geometric_normal, first.geometric_normal) > kSameNormal &&
+                   std::abs(point.distance_m - first.distance_m) < kSameDistance * first.distance_m;
+        mean.normal += point.shading_normal;
+    }
+    if (together) {
+        // A place on the surface itself, not between its points.
+        mean.normal = glm::normalize(mean.normal);
+        places.push_back(mean);
+        pixel.place.assign(pixel.points.size(), places.size() - 1);
+        return;
+    }
+    for (const SurfacePoint& point : pixel.points) {
+        pixel.place.push_back(places.size());
+        places.push_back(placeOf(point));
+    }
+}
+
+}  // namespace
+
+std::vector<std::optional<ReceiverPlace>> renderObjectPixels(const Camera& camera,
+                                                             const FivScene& scene,
+                                                             const ObjectShading& shading,
+                                                             RenderLayers& layers,
+                                                             Progress& progress)
+{
+    const int width = camera.width;
+    const int height = camera.height;
+    std::vector<std::optional<ReceiverPlace>> receivers(layers.alpha.pixelCount());
+    const int columns = (width + kTile - 1) / kTile;
+    const int rows = (height + kTile - 1) / kTile;
+    const Tracer tracer(camera, scene);
+    parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t tile) {
+        if (progress.cancelled()) return;
+        const int x0 = static_cast<int>(tile) % columns * kTile;
+        const int y0 = static_cast<int>(tile) / columns * kTile;
+        std::vector<PixelPoints> pixels;
+        std::vector<ObjectShading::Place> places;
+        // Blocks of 8 x 4 pixels: places next to each other in the list are neighbours.
+        for (int block = 0; block < kTile * kTile / 32; ++block)
+            for (int i = 0; i < 32; ++i) {
+                const glm::ivec2 pixel(x0 + block % (kTile / 8) * 8 + i % 8,
+                                       y0 + block / (kTile / 8) * 4 + i / 8);
+                if (pixel.x >= width || pixel.y >= height) continue;
+                PixelPoints seen;
+                float depth_m = 0.0f;
+                auto& receiver = receivers[static_cast<std::size_t>(pixel.y * width + pixel.x)];
+                if (!tracer.trace(pixel, seen, depth_m, receiver)) continue;
+                layers.depth_m(pixel.x, pixel.y) = depth_m;
+                listPlaces(seen, places);
+                pixels.push_back(std::move(seen));
+            }
+        const auto received = shading.receive(places);
+        for (const PixelPoints& pixel : pixels) {
+            Rgb sum(0.0f);
+            for (std::size_t i = 0; i < pixel.points.size(); ++i)
+                sum += shading.radiance(
+                    pixel.points[i], pixel.toward_camera[i], received[pixel.place[i]]);
+            layers.alpha(pixel.pixel.x, pixel.pixel.y) = pixel.alpha;
+            layers.object(pixel.pixel.x, pixel.pixel.y) =
+                sum * (pixel.alpha / static_cast<float>(pixel.points.size()));
+        }
+    });
+    progress.checkpoint();
+    return receivers;
+}
+
+}  // namespace insitu
