@@ -19,7 +19,7 @@ endfunction()
 function(insitu_test path)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;DEPS")
   if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 300)
+    set(arg_TIMEOUT 900)  # sanitizers on a busy machine take many times as long
   endif()
   get_filename_component(name ${path} NAME)
   get_filename_component(folder ${path} DIRECTORY)
