@@ -51,10 +51,23 @@ glm::dvec2 usualOrigin(int width, int height)
     return {0.5 * width, kOriginDown * height};
 }
 
+/// Deviations as large as the doubts, all by one factor, since they hang together.
 void widen(CameraEstimate& camera, double focal_doubt, double rotation_doubt)
 {
-    camera.focal_sigma_px = std::max(camera.focal_sigma_px, focal_doubt * camera.camera.focal_px.x);
-    camera.rotation_sigma_rad = std::max(camera.rotation_sigma_rad, rotation_doubt);
+    double factor = 1.0;
+    if (camera.focal_sigma_px > 0.0)
+        factor = std::max(factor, focal_doubt * camera.camera.focal_px.x / camera.focal_sigma_px);
+    if (camera.rotation_sigma_rad > 0.0)
+        factor = std::max(factor, rotation_doubt / camera.rotation_sigma_rad);
+    camera.focal_sigma_px *= factor;
+    camera.principal_sigma_px *= factor;
+    camera.division_sigma *= factor;
+    camera.rotation_sigma_rad *= factor;
+    camera.turn_sigma_rad *= factor;
+    camera.position_sigma_m *= factor;
+    for (auto& row : camera.covariance)
+        for (double& value : row)
+            value *= factor * factor;
 }
 
 }  // namespace

@@ -16,8 +16,11 @@ namespace {
 constexpr float kDimmed = 0.75f;
 constexpr glm::vec3 kYellow{1.0f, 0.85f, 0.1f};
 constexpr glm::vec3 kWhite{1.0f};
+constexpr glm::vec3 kOrange{1.0f, 0.6f, 0.2f};
 constexpr glm::vec3 kGrid{0.75f, 0.9f, 1.0f};
 constexpr double kAxisLength = 0.5;
+/// Ellipses reach so many fields from the origin: where things are put.
+constexpr int kDoubtReach = 6;
 
 void drawHorizon(EncodedImage& picture, const Camera& camera, double width)
 {
@@ -59,6 +62,39 @@ void drawGrid(EncodedImage& picture,
         drawWorldLine(picture, camera, {i * step, 0, -reach}, {i * step, 0, reach}, ink);
         drawWorldLine(picture, camera, {-reach, 0, i * step}, {reach, 0, i * step}, ink);
     }
+}
+
+/// Ellipses on the floor: along the line of sight and across it.
+void drawDoubts(EncodedImage& picture,
+                const CameraEstimate& estimate,
+                double step,
+                const OverlayOptions& options,
+                double width)
+{
+    constexpr int kPoints = 48;
+    const Camera& camera = estimate.camera;
+    const int reach = std::min(options.grid_reach, kDoubtReach);
+    for (int i = -reach; i <= reach; i += 2)
+        for (int k = -reach; k <= reach; k += 2) {
+            const glm::dvec3 point(i * step, 0.0, k * step);
+            const auto sigma = placementSigma(estimate, point);
+            glm::dvec3 along = point - camera.position_m;
+            along.y = 0.0;
+            if (!sigma || glm::length(along) < 1e-9) continue;
+            along = glm::normalize(along);
+            const glm::dvec3 across = glm::cross(along, glm::dvec3(0.0, 1.0, 0.0));
+            std::vector<glm::dvec2> outline;
+            for (int n = 0; n <= kPoints; ++n) {
+                const double turn = glm::two_pi<double>() * n / kPoints;
+                const auto p = camera.project(
+                    point + options.ellipse_sigmas * (along * (sigma->along_m * std::cos(turn)) +
+                                                      across * (sigma->across_m * std::sin(turn))));
+                if (!p) break;
+                outline.push_back(*p);
+            }
+            if (outline.size() == kPoints + 1)
+                drawPolyline(picture, outline, {kOrange, 0.8 * width, 0.9});
+        }
 }
 
 void drawAxes(EncodedImage& picture, const Camera& camera, double width)
@@ -151,6 +187,7 @@ Findings OverlayOptions::validate() const
           "grid_step_m must be positive");
     check(grid_reach > 0 && grid_reach <= 1000, "grid_reach must lie between 1 and 1000");
     check(std::isfinite(exaggeration) && exaggeration > 0.0, "exaggeration must be positive");
+    check(std::isfinite(ellipse_sigmas) && ellipse_sigmas > 0.0, "ellipse_sigmas must be positive");
     return problems;
 }
 
@@ -193,6 +230,7 @@ EncodedImage drawCalibration(const EncodedImage& photo,
     const double width = lineWidth(photo);
     const double step = gridStep(camera, options);
     drawGrid(picture, camera, step, options, width);
+    drawDoubts(picture, estimate, step, options, width);
     drawHorizon(picture, camera, width);
     drawSegments(picture, camera, lines, options.exaggeration, width);
     drawAxes(picture, camera, width);

@@ -19,6 +19,8 @@ struct OverlayOptions {
     int grid_reach = 8;
     /// Residuals are drawn so many times as large. > 0
     double exaggeration = 10.0;
+    /// Ellipses show so many standard deviations. > 0
+    double ellipse_sigmas = 2.0;
 
     /// Every problem at once: "overlay-options".
     [[nodiscard]] Findings validate() const;
@@ -37,6 +39,8 @@ struct OverlayOptions {
 ///     axes standing at the origin, half a metre long;
 ///   - how far off things on the floor may be (white ellipses, at the corners of every second
 ///   field);
+///   - how far off things that stand on the floor may be (placementSigma): ellipses on every second
+///     corner of the grid;
 ///   - a line of figures.
 /// The room or anything else is drawn over it with calib/picture_drawing.h.
 ///

@@ -290,9 +290,10 @@ void registerCalibrate(CLI::App& app, Context& context)
                      "Camera to write; the name's end says how: .json, .fspy, .fspy.json, .gltf, "
                      ".blender.json, cameras.txt")
         ->required();
-    command->add_option("--overlay",
-                        arguments->overlay,
-                        "Picture (.png, .jpg) of lines, residuals, horizon, floor grid and axes");
+    command->add_option(
+        "--overlay",
+        arguments->overlay,
+        "Picture (.png, .jpg) of lines, residuals, horizon, floor grid, axes and doubts");
     command
         ->add_option("--segment-sigma-px",
                      arguments->options.segment_sigma_px,

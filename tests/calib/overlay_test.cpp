@@ -90,6 +90,28 @@ TEST(Overlay, ShowsHorizonGridAndResiduals)
               sumOf(drawCalibration(photo, turned, room.lines.segments, plain)) + 200.0);
 }
 
+/// The ellipse at the world's origin: as long as placementSigma says, in the picture.
+TEST(Overlay, ShowsHowFarOffThingsMayBe)
+{
+    const synthetic::Room room = synthetic::makeRoom({20, -25, 0, 900, 1.5}, {5, 5, 5}, 4);
+    CalibrationOptions calibration;
+    calibration.segment_sigma_px = 2.0;
+    const CameraEstimate estimate = calibrateCamera(room.lines, calibration, "room");
+    const EncodedImage photo = blank(room.camera.width, room.camera.height);
+    OverlayOptions small;
+    small.ellipse_sigmas = 1e-3;
+    OverlayOptions large;
+    large.ellipse_sigmas = 4.0;
+    const double more = sumOf(drawCalibration(photo, estimate, room.lines.segments, large)) -
+                        sumOf(drawCalibration(photo, estimate, room.lines.segments, small));
+    EXPECT_GT(more, 300.0);
+    // Nothing known of the errors, nothing drawn.
+    CameraEstimate unknown;
+    unknown.camera = estimate.camera;
+    EXPECT_EQ(drawCalibration(photo, unknown, {}, small).codes,
+              drawCalibration(photo, unknown, {}, large).codes);
+}
+
 TEST(Overlay, RefusesAnotherSizeAndUnusableOptions)
 {
     CameraEstimate estimate;
@@ -100,7 +122,8 @@ TEST(Overlay, RefusesAnotherSizeAndUnusableOptions)
     options.grid_step_m = -1.0;
     options.grid_reach = 0;
     options.exaggeration = 0.0;
-    EXPECT_EQ(options.validate().size(), 3u);
+    options.ellipse_sigmas = 0.0;
+    EXPECT_EQ(options.validate().size(), 4u);
     EXPECT_THAT(inputErrorOf([&] { (void)drawCalibration(blank(10, 10), estimate, {}, options); }),
                 HasSubstr("grid_step_m"));
 }
