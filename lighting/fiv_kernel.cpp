@@ -166,13 +166,12 @@ void sumBase(Sum sum, const Job& job)
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void sumAvx2(Sum sum, const Job& job)
+INSITU_TARGET_AVX2 void sumAvx2(Sum sum, const Job& job)
 {
     sumAny(sum, job);
 }
 
-__attribute__((target("avx512f,avx512bw,avx512vl,avx512dq,prefer-vector-width=512"))) void
-sumAvx512(Sum sum, const Job& job)
+INSITU_TARGET_AVX512 void sumAvx512(Sum sum, const Job& job)
 {
     sumAny(sum, job);
 }
@@ -180,7 +179,8 @@ sumAvx512(Sum sum, const Job& job)
 
 void dispatch(Isa isa, Sum sum, const Job& job)
 {
-    INSITU_CHECK(static_cast<int>(isa) <= static_cast<int>(bestIsa()), "instruction set");
+    INSITU_CHECK(static_cast<int>(isa) <= static_cast<int>(bestInstructionSet()),
+                 "instruction set");
 #if defined(__x86_64__)
     if (isa == Isa::Avx512) return sumAvx512(sum, job);
     if (isa == Isa::Avx2) return sumAvx2(sum, job);
@@ -189,21 +189,6 @@ void dispatch(Isa isa, Sum sum, const Job& job)
 }
 
 }  // namespace
-
-Isa bestIsa()
-{
-#if defined(__x86_64__)
-    static const Isa best = [] {
-        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-            __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
-            return Isa::Avx512;
-        return __builtin_cpu_supports("avx2") ? Isa::Avx2 : Isa::Base;
-    }();
-    return best;
-#else
-    return Isa::Base;
-#endif
-}
 
 void addHidden(Isa isa, Sum sum, const Source& source, float bias_texels, Group& group)
 {

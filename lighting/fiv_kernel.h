@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/instruction_set.h"
 #include "lighting/silhouettes.h"
 
 #include <cstddef>
@@ -57,9 +58,7 @@ struct Occluder {
     std::vector<std::uint8_t> swapped;  ///< 1: the light's ω is the silhouette's −ω
 };
 
-/// Instruction sets that the sums were compiled for. All give the same bytes.
-enum class Isa { Base, Avx2, Avx512 };
-[[nodiscard]] Isa bestIsa();
+using Isa = InstructionSet;
 
 /// Adds to the blocks' sums what the object hides from their places, direction by direction.
 void addHidden(Isa isa, Sum sum, const Source& source, float bias_texels, Group& group);

@@ -12,9 +12,6 @@ namespace insitu::fiv {
 
 static_assert(std::endian::native == std::endian::little, "depths are read as pairs of 16 bits");
 
-// Inlined into one function for each instruction set, which then decides how loops are vectorised.
-#define INSITU_KERNEL inline __attribute__((always_inline))
-
 constexpr int kSize = Block::kSize;
 
 /// Places of a block in a silhouette.

@@ -45,7 +45,7 @@ void sumHidden(const std::vector<Source>& sources,
         for (std::size_t b = 0; b < Group::kBlocks; ++b)
             fiv::fillBlock(*group, b, places, normals, begin + b * Block::kSize);
         for (const Source& source : sources)
-            fiv::addHidden(fiv::bestIsa(), sum, source, bias_texels, *group);
+            fiv::addHidden(bestInstructionSet(), sum, source, bias_texels, *group);
         for (std::size_t i = begin; i < end; ++i)
             take(group->blocks[(i - begin) / Block::kSize], i, (i - begin) % Block::kSize);
     });

@@ -116,8 +116,9 @@ void ObjectStage::Impl::sum(Sum kind,
             for (std::size_t b = 0; b < Group::kBlocks; ++b)
                 fiv::fillBlock(groups[k], b, local, own_normals, b * Block::kSize);
         }
-        fiv::addHiddenByAny(fiv::bestIsa(), kind, of_cells, cells, bias, groups);
-        if (!fine.empty()) fiv::addHiddenByAny(fiv::bestIsa(), kind, of_fine, fine, bias, groups);
+        fiv::addHiddenByAny(bestInstructionSet(), kind, of_cells, cells, bias, groups);
+        if (!fine.empty())
+            fiv::addHiddenByAny(bestInstructionSet(), kind, of_fine, fine, bias, groups);
         for (std::size_t i = 0; i < count; ++i)
             take(groups[0].blocks[i / Block::kSize], begin + i, i % Block::kSize);
     });

@@ -1,30 +1,70 @@
 #include "apps/cli/command.h"
-#include "composite/tonemap/reinhard.h"
+#include "apps/cli/tonemap_options.h"
 #include "core/io/image_io.h"
+
+#include <set>
+#include <vector>
 
 namespace insitu::cli {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 struct TonemapArguments {
-    std::filesystem::path input;
-    std::filesystem::path output;
-    std::string operator_name = "reinhard";
-    ReinhardOptions reinhard;
+    std::vector<fs::path> inputs;
+    fs::path output;
+    TonemapOptions tone;
+    bool same_curve = false;
     int bits = 8;
 };
 
-void runTonemap(const TonemapArguments& arguments, Context& context)
+/// Where each picture goes: the named file, or, of several, one in the named folder each.
+std::vector<fs::path> outputsOf(const TonemapArguments& arguments)
+{
+    if (arguments.inputs.size() == 1) return {arguments.output};
+    if (!fs::is_directory(arguments.output))
+        throw InputError(arguments.output.string(),
+                         "is not a folder; several pictures need one to go to");
+    std::vector<fs::path> outputs;
+    std::set<fs::path> taken;
+    for (const fs::path& input : arguments.inputs) {
+        outputs.push_back(arguments.output / input.stem().concat(".png"));
+        if (!taken.insert(outputs.back()).second)
+            throw InputError(input.string(),
+                             "another input has the same name, and so the same output; rename it");
+    }
+    return outputs;
+}
+
+/// Of all pictures together; each is read again afterwards, so that one at a time is in memory.
+SceneStatistics commonStatistics(const std::vector<fs::path>& inputs)
+{
+    SceneStatistics statistics;
+    for (const fs::path& input : inputs)
+        statistics = statistics.joined(measureScene(readRadiance(input).pixels));
+    return statistics;
+}
+
+void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Context& context)
 {
     context.start();
-    context.checkOutput(arguments.output);
-    if (!isRadianceFile(arguments.input))
-        throw InputError(arguments.input.string(),
-                         "is not a radiance image; give an .exr, .hdr or .pfm file");
-    const auto tone_map = makeReinhard(arguments.reinhard);
-    const RadianceImage scene = readRadiance(arguments.input);
-    const Image<Rgb> display = tone_map->map(scene.pixels, context.progress());
-    writeEncoded(arguments.output, encodeSrgb(display, arguments.bits == 16 ? 65535 : 255));
+    const std::vector<fs::path> outputs = outputsOf(arguments);
+    for (const fs::path& output : outputs)
+        context.checkOutput(output);
+    for (const fs::path& input : arguments.inputs)
+        if (!isRadianceFile(input))
+            throw InputError(input.string(),
+                             "is not a radiance image; give an .exr, .hdr or .pfm file");
+    const auto tone_map = arguments.tone.make(command);
+    SceneStatistics common;
+    if (arguments.same_curve) common = commonStatistics(arguments.inputs);
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+        const Image<Rgb> scene = readRadiance(arguments.inputs[i]).pixels;
+        const SceneStatistics statistics = arguments.same_curve ? common : measureScene(scene);
+        const Image<Rgb> display = tone_map->map(scene, statistics, context.progress());
+        writeEncoded(outputs[i], encodeSrgb(display, arguments.bits == 16 ? 65535 : 255));
+    }
 }
 
 }  // namespace
@@ -33,30 +73,30 @@ void registerTonemap(CLI::App& app, Context& context)
 {
     auto arguments = std::make_shared<TonemapArguments>();
     CLI::App* command =
-        app.add_subcommand("tonemap", "Make a radiance image viewable on an ordinary display");
-    command->add_option("input", arguments->input, "Radiance image (.exr, .hdr, .pfm)")->required();
-    command->add_option("-o,--output", arguments->output, "Picture to write (.png, .jpg)")
+        app.add_subcommand("tonemap", "Make radiance images viewable on an ordinary display");
+    command->add_option("input", arguments->inputs, "Radiance images (.exr, .hdr, .pfm)")
         ->required();
-    command->add_option("--operator", arguments->operator_name, "Tone mapping operator: reinhard")
-        ->check(CLI::IsMember({"reinhard"}))
-        ->capture_default_str();
-    command->add_option("--key", arguments->reinhard.key, "Where the average luminance lands")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
     command
-        ->add_option("--white",
-                     arguments->reinhard.white,
-                     "Smallest scaled luminance shown as white; default: the brightest pixel")
-        ->check(CLI::PositiveNumber);
+        ->add_option("-o,--output",
+                     arguments->output,
+                     "Picture to write (.png, .jpg); of several inputs, the folder for NAME.png")
+        ->required();
+    arguments->tone.addTo(*command);
+    command->add_flag("--same-curve",
+                      arguments->same_curve,
+                      "One curve for all inputs, made from all of them: the same look");
     command->add_option("--bits", arguments->bits, "Bits per channel (16: .png only)")
         ->check(CLI::IsMember({8, 16}))
         ->capture_default_str();
     context.addCommonOptions(*command);
     command->footer(
+        "Black stays black; negative values of a file count as 0, NaN and infinity are refused.\n"
         "Examples:\n"
-        "  insitu tonemap room.exr -o room.png\n"
-        "  insitu tonemap night.exr -o night.png --key 0.09 --white 3");
-    command->callback([arguments, &context] { runTonemap(*arguments, context); });
+        "  insitu tonemap room.exr -o room.png --operator ashikhmin\n"
+        "  insitu tonemap night.exr -o night.png --key 0.09 --white 3\n"
+        "  insitu tonemap *.exr -o pictures/ --same-curve");
+    command->callback(
+        [arguments, command, &context] { runTonemap(*arguments, *command, context); });
 }
 
 }  // namespace insitu::cli

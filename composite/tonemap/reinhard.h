@@ -1,6 +1,6 @@
 #pragma once
 
-#include "composite/tonemap/operator.h"
+#include "composite/tonemap/separable.h"
 #include "core/finding.h"
 
 #include <memory>
@@ -25,6 +25,6 @@ struct ReinhardOptions {
 /// L (1 + L / white²) / (1 + L), keep the ratios of the channels.
 /// Throws InputError when the options are invalid.
 /// Source: [Reinhard02] equations 1, 2 and 4.
-[[nodiscard]] std::unique_ptr<ToneMapOperator> makeReinhard(const ReinhardOptions& options);
+[[nodiscard]] std::unique_ptr<SeparableOperator> makeReinhard(const ReinhardOptions& options);
 
 }  // namespace insitu

@@ -152,6 +152,57 @@ TEST(Tonemap, FailedRunLeavesNothingBehind)
     EXPECT_EQ(folder.size(), 3u);
 }
 
+TEST(Tonemap, ChoosesOperatorsAndRefusesForeignFlags)
+{
+    const TemporaryFolder folder;
+    writeRadiance(folder / "in.exr", Image<Rgb>(6, 5, Rgb(3.0f)));
+    const std::string input = (folder / "in.exr").string();
+    const std::string output = (folder / "out.png").string();
+    const auto run = [&](std::vector<std::string> flags) {
+        std::vector<std::string> arguments = {"tonemap", input, "-o", output, "--force"};
+        arguments.insert(arguments.end(), flags.begin(), flags.end());
+        return runProgram(arguments);
+    };
+    // A scene without range becomes middle grey: 0.18 is sRGB code 118.
+    EXPECT_EQ(run({"--operator", "ashikhmin"}).exit_code, kDone);
+    EXPECT_EQ(readPhoto(output).image.codes(2, 2), glm::u16vec3(118));
+    EXPECT_EQ(run({"--operator", "selective", "--contrast-threshold", "0.4"}).exit_code, kDone);
+
+    const ProgramRun foreign = run({"--operator", "ashikhmin", "--key", "0.2"});
+    EXPECT_EQ(foreign.exit_code, kWrongUsage);
+    EXPECT_THAT(foreign.messages, HasSubstr("--key"));
+
+    writeEncoded(folder / "map.png", grey(5, 6, 255));
+    const ProgramRun unfit =
+        run({"--operator", "selective", "--always", (folder / "map.png").string()});
+    EXPECT_EQ(unfit.exit_code, kFailed);
+    EXPECT_THAT(unfit.messages, HasSubstr("5x6"));
+}
+
+TEST(Tonemap, ManyPicturesGoIntoAFolderUnderOneCurve)
+{
+    const TemporaryFolder folder;
+    writeRadiance(folder / "a.exr", Image<Rgb>(6, 5, Rgb(1.0f)));
+    writeRadiance(folder / "b.exr", Image<Rgb>(6, 5, Rgb(4.0f)));
+    const std::vector<std::string> arguments = {"tonemap",
+                                                (folder / "a.exr").string(),
+                                                (folder / "b.exr").string(),
+                                                "-o",
+                                                (folder / "out").string(),
+                                                "--white",
+                                                "1e9",
+                                                "--same-curve"};
+    const ProgramRun missing = runProgram(arguments);
+    EXPECT_EQ(missing.exit_code, kFailed);
+    EXPECT_THAT(missing.messages, HasSubstr("folder"));
+
+    std::filesystem::create_directory(folder / "out");
+    EXPECT_EQ(runProgram(arguments).exit_code, kDone);
+    // Their common log average is 2: L = 0.09 and 0.36, Ld = L / (1 + L), in sRGB.
+    EXPECT_EQ(readPhoto(folder / "out" / "a.png").image.codes(0, 0), glm::u16vec3(81));
+    EXPECT_EQ(readPhoto(folder / "out" / "b.png").image.codes(0, 0), glm::u16vec3(141));
+}
+
 TEST(Tonemap, RefusesAnEncodedPicture)
 {
     const TemporaryFolder folder;

@@ -147,7 +147,7 @@ TEST(HiddenLight, EveryInstructionSetAndThreadCountGivesTheSameBytes)
     };
     const std::vector<float> base = sums(fiv::Isa::Base);
     EXPECT_NE(*std::ranges::max_element(base), 0.0f);
-    for (int isa = 1; isa <= static_cast<int>(fiv::bestIsa()); ++isa)
+    for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa)
         EXPECT_TRUE(same(sums(static_cast<fiv::Isa>(isa)), base)) << isa;
 }
 

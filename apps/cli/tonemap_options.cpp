@@ -1,0 +1,126 @@
+#include "apps/cli/tonemap_options.h"
+
+#include "core/io/image_io.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+namespace insitu::cli {
+
+namespace {
+
+/// Which operators each flag belongs to; "selective" also takes those of the operator it selects.
+struct FlagUse {
+    const char* flag;
+    std::vector<std::string> operators;
+};
+
+const std::vector<FlagUse>& flagUses()
+{
+    static const std::vector<FlagUse> uses = {{"--key", {"reinhard"}},
+                                              {"--white", {"reinhard"}},
+                                              {"--contrast-threshold", {"ashikhmin"}},
+                                              {"--scene-white-cd-m2", {"ashikhmin"}},
+                                              {"--display-white-cd-m2", {"ashikhmin"}},
+                                              {"--select", {"selective"}},
+                                              {"--importance-threshold", {"selective"}},
+                                              {"--importance", {"selective"}},
+                                              {"--always", {"selective"}}};
+    return uses;
+}
+
+/// Codes of a picture's green channel as numbers in [0, 1].
+Image<float> readMap(const std::filesystem::path& path)
+{
+    if (path.empty()) return {};
+    const EncodedImage picture = readPhoto(path).image;
+    Image<float> map(picture.codes.width(), picture.codes.height());
+    for (std::size_t i = 0; i < map.pixelCount(); ++i)
+        map.pixels()[i] =
+            static_cast<float>(picture.codes.pixels()[i].g) / static_cast<float>(picture.max_code);
+    return map;
+}
+
+}  // namespace
+
+void TonemapOptions::addTo(CLI::App& command)
+{
+    command
+        .add_option("--operator",
+                    name_,
+                    "reinhard (global), ashikhmin (local), selective (local where it matters)")
+        ->check(CLI::IsMember({"reinhard", "ashikhmin", "selective"}))
+        ->capture_default_str();
+    command.add_option("--key", reinhard_.key, "Where the average luminance lands (reinhard)")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command
+        .add_option("--white",
+                    reinhard_.white,
+                    "Smallest scaled luminance shown as white; default: the brightest pixel "
+                    "(reinhard)")
+        ->check(CLI::PositiveNumber);
+    command
+        .add_option("--contrast-threshold",
+                    ashikhmin_.contrast_threshold,
+                    "Local contrast that ends a pixel's neighbourhood (ashikhmin)")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
+    command
+        .add_option("--scene-white-cd-m2",
+                    ashikhmin_.viewing.scene_white_cd_m2,
+                    "Luminance of scene value 1 (ashikhmin); default: the log average becomes 30")
+        ->check(CLI::PositiveNumber);
+    command
+        .add_option("--display-white-cd-m2",
+                    ashikhmin_.viewing.display_white_cd_m2,
+                    "Luminance of the display's white (ashikhmin)")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command.add_option("--select", selected_, "Operator whose local part is selected (selective)")
+        ->check(CLI::IsMember({"ashikhmin"}))
+        ->capture_default_str();
+    command
+        .add_option("--importance-threshold",
+                    importance_threshold_,
+                    "Sobel gradient of ln luminance, or map value, that is important (selective)")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command.add_option("--importance",
+                       importance_,
+                       "Picture to take importance from in place of the gradient (selective)");
+    command.add_option(
+        "--always", always_, "Picture, white where the local part always counts (selective)");
+}
+
+std::shared_ptr<const SeparableOperator> TonemapOptions::makeSeparable(
+    const std::string& name) const
+{
+    if (name == "ashikhmin") return makeAshikhmin(ashikhmin_);
+    return makeReinhard(reinhard_);
+}
+
+std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command) const
+{
+    const bool selective = name_ == "selective";
+    for (const FlagUse& use : flagUses()) {
+        const auto takes = [&](const std::string& name) {
+            return std::find(use.operators.begin(), use.operators.end(), name) !=
+                   use.operators.end();
+        };
+        if (command.count(use.flag) > 0 && !takes(name_) && !(selective && takes(selected_)))
+            throw CLI::ValidationError(use.flag,
+                                       "is not a flag of operator " + name_ +
+                                           "; leave it out or choose " + use.operators.front());
+    }
+    if (name_ == "reinhard") return makeReinhard(reinhard_);
+    if (name_ == "ashikhmin") return makeAshikhmin(ashikhmin_);
+    SelectiveOptions options;
+    options.importance_threshold = importance_threshold_;
+    options.importance = readMap(importance_);
+    options.always = readMap(always_);
+    return makeSelective(makeSeparable(selected_), std::move(options));
+}
+
+}  // namespace insitu::cli

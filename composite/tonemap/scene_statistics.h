@@ -1,0 +1,27 @@
+#pragma once
+
+#include "core/image.h"
+
+#include <cstdint>
+
+namespace insitu {
+
+/// What tone curves are made from: the luminances of one picture, or of a set of pictures.
+struct SceneStatistics {
+    std::int64_t pixels = 0;
+    double smallest = 0.0;  ///< least and largest luminance, unit of the scene
+    double largest = 0.0;
+    double mean = 0.0;
+    /// exp(mean(log(delta + L))), delta a millionth of the mean, which saves black pixels from
+    /// log(0) without a unit of its own. 0 when all is black.
+    double log_average = 0.0;
+
+    /// Those of both together: two photographs that share a curve.
+    [[nodiscard]] SceneStatistics joined(const SceneStatistics& other) const;
+};
+
+/// Throws InputError naming the first pixel, in order of rows, that is not finite and >= 0.
+/// Source: [Reinhard02] equation 1 for the log average.
+[[nodiscard]] SceneStatistics measureScene(const Image<Rgb>& scene);
+
+}  // namespace insitu

@@ -1,0 +1,33 @@
+#pragma once
+
+#include "composite/tonemap/separable.h"
+
+namespace insitu::tonemap {
+
+/// Decides, tile by tile, where the local part counts. Private to this module.
+class Importance {
+public:
+    virtual ~Importance() = default;
+
+    /// How far around a tile it looks: pixels, a multiple of 4.
+    [[nodiscard]] virtual int halo() const = 0;
+    /// Weight of the local part, row-major `patch.width` wide with each row's even columns first,
+    /// in [0, 1], for the tile at (x0, y0) of the picture. Returns the blocks with any weight above
+    /// 0.
+    virtual WantedBlocks weigh(const LuminancePatch& patch,
+                               const ToneCurve& curve,
+                               int x0,
+                               int y0,
+                               float* weights) const = 0;
+};
+
+/// Maps a picture tile by tile. `local` null: the global curve alone. `importance` null: the local
+/// part everywhere; else where it says, blended by its weights with the pixel's own luminance.
+void mapTiles(const Image<Rgb>& scene,
+              const ToneCurve& curve,
+              const LocalAdaptation* local,
+              const Importance* importance,
+              Image<Rgb>& display,
+              Progress& progress);
+
+}  // namespace insitu::tonemap
