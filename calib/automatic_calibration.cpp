@@ -1,6 +1,7 @@
 #include "calib/automatic_calibration.h"
 
-#include "calib/exif_focal.h"
+#include "calib/camera_errors.h"
+#include "calib/photo_calibration.h"
 #include "core/check.h"
 
 #include <fmt/format.h>
@@ -15,15 +16,8 @@ namespace {
 
 constexpr double kOriginDown = 0.85;
 
-std::optional<FocalPrior> settleExif(const Photo& photo, CalibrationOptions& options)
+std::optional<FocalPrior> priorOf(const CalibrationOptions& options)
 {
-    if (!options.exif_focal_px) {
-        if (const auto exif = focalFromExif(
-                photo.metadata, photo.image.codes.width(), photo.image.codes.height())) {
-            options.exif_focal_px = exif->focal_px;
-            options.exif_focal_sigma = exif->sigma;
-        }
-    }
     if (!options.exif_focal_px || !options.use_exif) return std::nullopt;
     return FocalPrior{*options.exif_focal_px, options.exif_focal_sigma};
 }
@@ -51,25 +45,6 @@ glm::dvec2 usualOrigin(int width, int height)
     return {0.5 * width, kOriginDown * height};
 }
 
-/// Deviations as large as the doubts, all by one factor, since they hang together.
-void widen(CameraEstimate& camera, double focal_doubt, double rotation_doubt)
-{
-    double factor = 1.0;
-    if (camera.focal_sigma_px > 0.0)
-        factor = std::max(factor, focal_doubt * camera.camera.focal_px.x / camera.focal_sigma_px);
-    if (camera.rotation_sigma_rad > 0.0)
-        factor = std::max(factor, rotation_doubt / camera.rotation_sigma_rad);
-    camera.focal_sigma_px *= factor;
-    camera.principal_sigma_px *= factor;
-    camera.division_sigma *= factor;
-    camera.rotation_sigma_rad *= factor;
-    camera.turn_sigma_rad *= factor;
-    camera.position_sigma_m *= factor;
-    for (auto& row : camera.covariance)
-        for (double& value : row)
-            value *= factor * factor;
-}
-
 }  // namespace
 
 Findings AutomaticOptions::validate() const
@@ -95,8 +70,11 @@ AutomaticCalibration calibrateAutomatically(const Photo& photo,
                                             const std::string& source)
 {
     requireValid(automatic.validate(), "automatic calibration options");
-    const auto exif = settleExif(photo, options);
-    const auto found = findRoomLines(photo.image, exif, automatic.lines);
+    options = withExif(std::move(options), photo);
+    const auto exif = priorOf(options);
+    RoomLineOptions line_options = automatic.lines;
+    if (!line_options.up) line_options.up = options.exif_gravity;
+    const auto found = findRoomLines(photo.image, exif, line_options);
     if (!found)
         throw NoAnswerError(source,
                             "the picture has too few straight edges to find the room's directions; "
@@ -120,21 +98,33 @@ AutomaticCalibration calibrateAutomatically(const Photo& photo,
     options.segment_sigma_px = found->sigma_px;
     result.camera = calibrateCamera(lines, options, source);
 
-    widen(result.camera, found->focal_doubt, found->rotation_doubt);
+    widen(found->doubt, result.camera);
     Findings& findings = result.camera.findings;
     findings.push_back(
         {Severity::Info,
          "automatic-lines",
          fmt::format("{} of {} edges follow the room's directions ({}; {:.0f} % by length); "
                      "focal length ± {:.1f} %, rotation ± {:.2f}°, evidence {:.0f} over the next "
-                     "best answer",
+                     "best answer; of the angle between x and z the edges alone say {:.0f} ± "
+                     "{:.0f}°",
                      found->segments.size(),
                      found->detected,
                      countsOf(found->segments),
                      100.0 * found->explained,
                      100.0 * found->focal_doubt,
                      glm::degrees(found->rotation_doubt),
-                     found->margin)});
+                     found->margin,
+                     90.0 + glm::degrees(found->angle_off),
+                     glm::degrees(found->angle_sigma))});
+    if (found->second)
+        findings.push_back(
+            {Severity::Info,
+             "automatic-second-directions",
+             fmt::format("{} more edges run along a second pair of horizontal directions, turned "
+                         "by {:.1f}° (counter-clockwise seen from above): walls or furniture that "
+                         "stand askew; they have no part in the answer",
+                         found->second->segments,
+                         glm::degrees(found->second->turn_rad))});
     if (!found->objections.empty())
         findings.push_back({Severity::Warning, "automatic-doubtful", joined(found->objections)});
     if (!automatic.origin_px)
@@ -165,14 +155,14 @@ AutomaticCalibration calibrateCompleted(const LineSet& strokes,
                          "distortion",
                          "edges that the lens bends cannot be followed: leave out --auto, or "
                          "undistort the photograph first");
-    const auto exif = settleExif(photo, options);
-    const auto completed = completeStrokes(strokes, photo.image, exif, line_options);
+    options = withExif(std::move(options), photo);
+    const auto completed = completeStrokes(strokes, photo.image, priorOf(options), line_options);
     AutomaticCalibration result;
     result.lines = completed ? completed->lines : strokes;
     if (completed) options.segment_sigma_px = completed->sigma_px;
     result.camera = calibrateCamera(result.lines, options, source);
     if (completed) {
-        widen(result.camera, completed->focal_doubt, completed->rotation_doubt);
+        widen(completed->doubt, result.camera);
         result.camera.findings.push_back(
             {Severity::Info,
              "lines-completed",

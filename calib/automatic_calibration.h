@@ -41,6 +41,7 @@ struct AutomaticCalibration {
 /// The stated errors are those of calibrateCamera, or the doubts of findRoomLines where larger.
 /// Findings, beside those of calibrateCamera:
 ///   automatic-lines      how many edges the answer rests on, and the doubts in numbers
+///   automatic-second-directions  furniture or walls that stand askew, and by how much
 ///   automatic-doubtful   objections, with `accept_doubtful`
 ///   origin-assumed       no origin was given
 ///   scale-assumed        no camera height was given: lengths are in camera heights

@@ -1,5 +1,6 @@
 #include "calib/board_pose.h"
 
+#include "calib/camera_errors.h"
 #include "core/check.h"
 
 #include <Eigen/Dense>
@@ -159,12 +160,11 @@ Pose poseOf(const BoardPose& pose)
 }
 
 /// The other picture's camera in the room.
-Camera closeUp(const CameraEstimate& room,
+Camera closeUp(const Camera& camera,
                const Pose& board_before_room,
                const Camera& lens,
                const Pose& board_before_lens)
 {
-    const Camera& camera = room.camera;
     const glm::dmat3 world_from_room(camera.right, -camera.up, camera.forward);
     const glm::dmat3 world_from_board = world_from_room * board_before_room.turn;
     const glm::dvec3 board_origin = camera.position_m + world_from_room * board_before_room.origin;
@@ -234,7 +234,7 @@ BoardLocation placeByBoard(const CameraEstimate& room,
                             fmt::format("the board is not seen well enough in {}: at least two "
                                         "markers are needed",
                                         before_room ? "the other picture" : "the photograph"));
-    const auto place = [&](const CameraEstimate& camera,
+    const auto place = [&](const Camera& camera,
                            const Pose& room_pose,
                            const Camera& lens,
                            const Pose& lens_pose) {
@@ -242,12 +242,11 @@ BoardLocation placeByBoard(const CameraEstimate& room,
         exact.camera = closeUp(camera, room_pose, lens, lens_pose);
         return placeBall(exact, ball, source);
     };
-    CameraEstimate camera = room;
     const Pose room_pose = poseOf(*before_room);
     const Pose lens_pose = poseOf(*before_lens);
     BoardLocation result;
-    result.close_up = closeUp(room, room_pose, close_lens, lens_pose);
-    result.ball = place(camera, room_pose, close_lens, lens_pose);
+    result.close_up = closeUp(room.camera, room_pose, close_lens, lens_pose);
+    result.ball = place(room.camera, room_pose, close_lens, lens_pose);
     append(result.findings, before_room->findings);
     append(result.findings, before_lens->findings);
     append(result.findings, result.ball.findings);
@@ -265,30 +264,25 @@ BoardLocation placeByBoard(const CameraEstimate& room,
         const Eigen::Matrix<double, 6, 6> root = m.llt().matrixL();
         for (int k = 0; k < 6; ++k) {
             const Pose off = moved(in_room ? room_pose : lens_pose, root.col(k));
-            add(place(camera, in_room ? off : room_pose, close_lens, in_room ? lens_pose : off)
+            add(place(room.camera, in_room ? off : room_pose, close_lens, in_room ? lens_pose : off)
                     .center_m -
                 center);
         }
     }
-    // Focal lengths: the board's distance follows from them.
-    const auto with_focal = [&](bool in_room, double share) {
-        CameraEstimate other = room;
-        Camera lens = close_lens;
-        (in_room ? other.camera : lens).focal_px *= 1.0 + share;
-        const auto a = boardPose(room_corners, other.camera);
+    // The cameras: the board's place before each follows from what they are.
+    const auto with = [&](const Camera& camera, const Camera& lens) {
+        const auto a = boardPose(room_corners, camera);
         const auto b = boardPose(close_corners, lens);
-        return a && b ? place(other, poseOf(*a), lens, poseOf(*b)).center_m : center;
+        if (!a || !b) throw NoAnswerError(source, "the board's place does not converge");
+        return place(camera, poseOf(*a), lens, poseOf(*b)).center_m;
     };
-    add(with_focal(true, room.focal_sigma_px / room.camera.focal_px.x) - center);
-    add(with_focal(false, close_focal_sigma) - center);
-    // The room's camera turns and moves all.
-    const double turn = room.rotation_sigma_rad / std::sqrt(3.0);
-    for (int k = 0; k < 3; ++k) {
-        glm::dvec3 axis(0.0);
-        axis[k] = turn;
-        add(glm::cross(axis, center - room.camera.position_m));
-        covariance[k][k] += room.position_sigma_m[k] * room.position_sigma_m[k];
-    }
+    covariance +=
+        covarianceFromCamera(room, [&](const Camera& camera) { return with(camera, close_lens); });
+    CameraEstimate lens_estimate;
+    lens_estimate.camera = close_lens;
+    lens_estimate.focal_sigma_px = close_focal_sigma * close_lens.focal_px.x;
+    covariance += covarianceFromCamera(lens_estimate,
+                                       [&](const Camera& lens) { return with(room.camera, lens); });
     for (int k = 0; k < 3; ++k)
         result.ball.sigma_m[k] = std::sqrt(covariance[k][k]);
     return result;

@@ -70,7 +70,8 @@ struct BoardLocation {
 /// close_lens    size, focal length and principal point of the other picture's camera (its EXIF);
 ///               close_focal_sigma its deviation, of ln f
 /// ball          its outline in the other picture
-/// The covariance is first order, the room camera's errors as in placeBall.
+/// The covariance is first order: outline, corners, and the room's camera by its full covariance,
+/// which moves the board before it too.
 /// NoAnswerError (naming `source`): a picture without enough of the board; those of placeBall.
 [[nodiscard]] BoardLocation placeByBoard(const CameraEstimate& room,
                                          std::span<const BoardCorner> room_corners,

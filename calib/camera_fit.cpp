@@ -1,7 +1,5 @@
 #include "calib/camera_fit.h"
 
-#include "calib/camera_constraints.h"
-
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -26,20 +24,6 @@ constexpr double kLengthShare = 0.02;
 constexpr double kLooseLength = 0.1;
 /// Normal quantile of the test for consistent errors (one in a thousand).
 constexpr double kConsistencyQuantile = 3.09;
-
-View<double> viewAt(const LineSet& lines, const State& at)
-{
-    View<double> view;
-    view.camera_from_world = at.camera_from_world;
-    view.log_focal = at.log_focal;
-    view.focal = std::exp(at.log_focal);
-    view.principal = at.principal_px;
-    view.division = at.division;
-    view.square_half_diagonal = 0.25 * (static_cast<double>(lines.width) * lines.width +
-                                        static_cast<double>(lines.height) * lines.height);
-    view.position = at.position_m;
-    return view;
-}
 
 /// Largest χ² that n degrees of freedom explain (Wilson–Hilferty).
 double chiSquaredLimit(double freedom)
@@ -200,6 +184,20 @@ std::optional<Fit> withLengths(const LineSet& lines, Fit loose)
 }
 
 }  // namespace
+
+View<double> viewAt(const LineSet& lines, const State& at)
+{
+    View<double> view;
+    view.camera_from_world = at.camera_from_world;
+    view.log_focal = at.log_focal;
+    view.focal = std::exp(at.log_focal);
+    view.principal = at.principal_px;
+    view.division = at.division;
+    view.square_half_diagonal = 0.25 * (static_cast<double>(lines.width) * lines.width +
+                                        static_cast<double>(lines.height) * lines.height);
+    view.position = at.position_m;
+    return view;
+}
 
 double endDistance(const LineSet& lines, std::size_t index, const State& at)
 {

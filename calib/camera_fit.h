@@ -1,5 +1,6 @@
 #pragma once
 
+#include "calib/camera_constraints.h"
 #include "calib/camera_problem.h"
 
 #include <cstddef>
@@ -36,6 +37,9 @@ struct Fit {
 
 /// |λ| in standard deviations if it were free, by one Gauss–Newton step from the solution.
 [[nodiscard]] double divisionScore(const Fit& fit);
+
+/// The camera of a state, for the equations of camera_constraints.h.
+[[nodiscard]] View<double> viewAt(const LineSet& lines, const State& at);
 
 /// Distance of the ends of segment `index` from the best line through its vanishing point, pixels.
 [[nodiscard]] double endDistance(const LineSet& lines, std::size_t index, const State& at);

@@ -1,7 +1,9 @@
 #include "calib/camera_solve.h"
 
+#include "calib/camera_errors.h"
 #include "calib/camera_findings.h"
 #include "calib/camera_fit.h"
+#include "calib/camera_lines.h"
 #include "calib/camera_start.h"
 #include "core/check.h"
 
@@ -265,22 +267,14 @@ std::array<std::optional<glm::dvec2>, 3> vanishingPoints(const LineSet& lines,
     return points;
 }
 
-void fillSigmas(const Fit& fit, CameraEstimate& estimate)
+CameraCovariance statedCovariance(const Fit& fit)
 {
     const Matrix covariance = fit.covariance();
+    CameraCovariance result;
     for (int row = 0; row < calibration::kUnknowns; ++row)
         for (int column = 0; column < calibration::kUnknowns; ++column)
-            estimate.covariance[row][column] = covariance(row, column);
-    const calibration::Vector sigma = covariance.diagonal().cwiseSqrt();
-    estimate.focal_sigma_px = estimate.camera.focal_px.x * sigma[calibration::kLogFocal];
-    for (int i = 0; i < 2; ++i)
-        estimate.principal_sigma_px[i] = sigma[calibration::kPrincipal + i];
-    estimate.division_sigma = sigma[calibration::kDivision];
-    for (int i = 0; i < 3; ++i) {
-        estimate.turn_sigma_rad[i] = sigma[calibration::kTurn + i];
-        estimate.position_sigma_m[i] = sigma[calibration::kPosition + i];
-    }
-    estimate.rotation_sigma_rad = glm::length(estimate.turn_sigma_rad);
+            result[row][column] = covariance(row, column);
+    return result;
 }
 
 }  // namespace
@@ -302,11 +296,10 @@ Findings CalibrationOptions::validate() const
     return problems;
 }
 
-CameraEstimate calibrateCamera(const LineSet& marked,
-                               const CalibrationOptions& options,
-                               const std::string& source)
+CameraEstimate calibration::calibrateLines(const LineSet& marked,
+                                           const CalibrationOptions& options,
+                                           const std::string& source)
 {
-    requireValid(options.validate(), "calibration options");
     marked.check(source);
     checkAxes(marked, source);
     CameraEstimate estimate;
@@ -314,7 +307,7 @@ CameraEstimate calibrateCamera(const LineSet& marked,
     const Fit& fit = *solved.fit;
     checkResiduals(marked, fit, options, source);
     estimate.camera = cameraFrom(marked, fit.solution.state);
-    fillSigmas(fit, estimate);
+    setCovariance(statedCovariance(fit), estimate);
     if (!(estimate.rotation_sigma_rad < kRotationOpen))
         throw NoAnswerError(source,
                             "segments",

@@ -21,6 +21,11 @@ struct CalibrationOptions {
     std::optional<double> exif_focal_px;
     /// Relative standard deviation of the EXIF focal length as a prior. Unitless, > 0.
     double exif_focal_sigma = 0.03;
+    /// Up by EXIF's accelerometer (calib/exif_gravity.h): a prior that gives way when the lines
+    /// contradict it. A LineSet's own `gravity` comes first.
+    std::optional<Gravity> exif_gravity;
+    /// Whether calibratePhoto and its like read `exif_gravity` from the photograph.
+    bool use_exif_gravity = true;
     /// Standard deviation of a marked coordinate, pixels, > 0.
     double segment_sigma_px = 1.0;
     /// Use the EXIF focal as a prior in the solve. False: lines alone where they suffice.
@@ -84,6 +89,8 @@ struct CameraEstimate {
 ///   focal-from-exif             the lines leave the focal length open (one-point view), EXIF's is
 ///                               used
 ///   focal-disagrees-with-exif   lines and EXIF contradict each other; the lines alone are used
+///   gravity-from-exif           EXIF's accelerometer is part of the solve
+///   gravity-disagrees-with-exif the lines put up elsewhere by 4 σ; the lines alone are used
 ///   segments-inconsistent       residuals too large for `segment_sigma_px`; the standard
 ///                               deviations are those of the larger error that the residuals show
 ///   calibration-weak            focal length worse than 5 %, rotation worse than 1°, or position

@@ -119,20 +119,6 @@ void orient(const glm::dmat3& axes, const Eigen::Vector3d& origin_ray, Start& st
     start.state.camera_from_world.col(2) = right.cross(up);
 }
 
-View<double> viewOf(const LineSet& lines, const State& state)
-{
-    View<double> view;
-    view.camera_from_world = state.camera_from_world;
-    view.log_focal = state.log_focal;
-    view.focal = std::exp(state.log_focal);
-    view.principal = state.principal_px;
-    view.division = state.division;
-    view.square_half_diagonal = 0.25 * (static_cast<double>(lines.width) * lines.width +
-                                        static_cast<double>(lines.height) * lines.height);
-    view.position.setZero();
-    return view;
-}
-
 /// Camera height: given, or the median of what the known lengths say.
 std::optional<double> heightAtStart(const LineSet& lines, Start& start)
 {
@@ -165,7 +151,7 @@ void placeAtStart(const LineSet& lines, Start& start)
 {
     const double origin[2] = {lines.origin_px.x, lines.origin_px.y};
     Vec3<double> on_floor;
-    if (!onFloor(viewOf(lines, start.state), origin, on_floor)) {
+    if (!onFloor(viewAt(lines, start.state), origin, on_floor)) {
         start.place = "origin_px";
         start.complaint = fmt::format(
             "({:.1f}, {:.1f}) lies on or above the horizon, so no floor "
@@ -196,7 +182,7 @@ std::optional<Start> findStart(const LineSet& lines,
     State camera = start.state;
     camera.camera_from_world.setIdentity();
     const double origin[2] = {lines.origin_px.x, lines.origin_px.y};
-    orient(found->orientation.camera_from_world, viewOf(lines, camera).ray(origin), start);
+    orient(found->orientation.camera_from_world, viewAt(lines, camera).ray(origin), start);
     if (start.complaint.empty()) placeAtStart(lines, start);
     return start;
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace insitu::manhattan {
 
@@ -42,9 +43,16 @@ double beforehand(const Task& task, const Frame& frame)
     for (int k = 1; k < 3; ++k)
         if (std::abs(frame.axes[k].y) > std::abs(frame.axes[up].y)) up = k;
     const glm::dvec3 d = frame.axes[up];
-    const double roll = std::atan2(d.x, std::abs(d.y)) * (d.y < 0.0 ? -1.0 : 1.0);
-    const double pitch = std::asin(std::clamp(d.z, -1.0, 1.0));
-    double sum = heavyTailed(roll / kRollSpread) + heavyTailed(pitch / kPitchSpread);
+    double sum = 0.0;
+    if (task.up) {
+        const double off =
+            std::acos(std::min(1.0, std::abs(glm::dot(d, glm::normalize(task.up->up)))));
+        sum = heavyTailed(off / task.up->sigma_rad);
+    } else {
+        const double roll = std::atan2(d.x, std::abs(d.y)) * (d.y < 0.0 ? -1.0 : 1.0);
+        const double pitch = std::asin(std::clamp(d.z, -1.0, 1.0));
+        sum = heavyTailed(roll / kRollSpread) + heavyTailed(pitch / kPitchSpread);
+    }
     const FocalPrior usual{kUsualFocal * task.long_side, kFocalSpread};
     const FocalPrior& prior = task.prior ? *task.prior : usual;
     const double u = std::log(frame.focal_px / prior.focal_px) / prior.sigma;
@@ -75,14 +83,26 @@ Frame turned(const Frame& frame, const Eigen::Vector4d& step)
     return moved;
 }
 
-/// One Gauss–Newton step of the expected squared angles.
-Eigen::Vector4d newtonStep(const Task& task,
-                           const Frame& frame,
-                           const std::vector<std::array<double, 3>>& shares)
+using Shares = std::vector<std::array<double, 3>>;
+
+Shares sharesOf(const Task& task, const Frame& frame)
+{
+    Shares shares(task.observations.size());
+    for (std::size_t i = 0; i < shares.size(); ++i)
+        shares[i] = memberships(task.observations[i], frame);
+    return shares;
+}
+
+/// Normal equations of the expected squared angles, by turns and ln f.
+struct Normal {
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
+};
+
+Normal normalEquations(const Task& task, const Frame& frame, const Shares& shares)
 {
     constexpr double kDifference = 1e-6;
-    Eigen::Matrix4d information = Eigen::Matrix4d::Identity() * 1e-3;
-    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
+    Normal normal;
     std::array<Frame, 8> moved;
     for (int p = 0; p < 4; ++p)
         for (int sign = 0; sign < 2; ++sign) {
@@ -103,27 +123,34 @@ Eigen::Vector4d newtonStep(const Task& task,
                     (missAngle(segment, moved[2 * p].axes[k], moved[2 * p].focal_px) -
                      missAngle(segment, moved[2 * p + 1].axes[k], moved[2 * p + 1].focal_px)) /
                     (2.0 * kDifference);
-            information += weight * derivative * derivative.transpose();
-            gradient += weight * derivative * missAngle(segment, frame.axes[k], frame.focal_px);
+            normal.information += weight * derivative * derivative.transpose();
+            normal.gradient +=
+                weight * derivative * missAngle(segment, frame.axes[k], frame.focal_px);
         }
     }
+    return normal;
+}
+
+/// One Gauss–Newton step.
+Eigen::Vector4d newtonStep(const Task& task, const Frame& frame, const Shares& shares)
+{
+    Normal normal = normalEquations(task, frame, shares);
+    normal.information += Eigen::Matrix4d::Identity() * 1e-3;
     if (task.prior) {
         const double precision = 1.0 / (task.prior->sigma * task.prior->sigma);
-        information(3, 3) += precision;
-        gradient(3) += precision * std::log(frame.focal_px / task.prior->focal_px);
+        normal.information(3, 3) += precision;
+        normal.gradient(3) += precision * std::log(frame.focal_px / task.prior->focal_px);
     } else {
         // Keeps an open focal length where it is.
-        information(3, 3) += 25.0;
+        normal.information(3, 3) += 25.0;
     }
-    Eigen::Vector4d step = -information.ldlt().solve(gradient);
+    Eigen::Vector4d step = -normal.information.ldlt().solve(normal.gradient);
     const double size = step.norm();
     if (size > 0.1) step *= 0.1 / size;
     return step;
 }
 
-double slackOf(const Task& task,
-               const Frame& frame,
-               const std::vector<std::array<double, 3>>& shares)
+double slackOf(const Task& task, const Frame& frame, const Shares& shares)
 {
     double sum = 0.0;
     double count = 1e-9;
@@ -193,10 +220,8 @@ double evidence(const Task& task, const Frame& frame)
 Frame refined(const Task& task, Frame start)
 {
     Frame frame = start;
-    std::vector<std::array<double, 3>> shares(task.observations.size());
     for (int round = 0; round < 25; ++round) {
-        for (std::size_t i = 0; i < shares.size(); ++i)
-            shares[i] = memberships(task.observations[i], frame);
+        const Shares shares = sharesOf(task, frame);
         const Eigen::Vector4d step = newtonStep(task, frame, shares);
         frame = turned(frame, step);
         frame.focal_px = std::clamp(
@@ -206,6 +231,18 @@ Frame refined(const Task& task, Frame start)
     }
     frame.score = evidence(task, frame);
     return frame;
+}
+
+double focalSigma(const Task& task, const Frame& frame)
+{
+    const Normal normal = normalEquations(task, frame, sharesOf(task, frame));
+    const Eigen::Matrix4d& all = normal.information;
+    // What is left of its own information when the turns adapt.
+    const Eigen::Vector3d mixed = all.block<3, 1>(0, 3);
+    const Eigen::Matrix3d turns =
+        all.topLeftCorner<3, 3>() + 1e-9 * all.trace() * Eigen::Matrix3d::Identity();
+    const double left = all(3, 3) - mixed.dot(turns.ldlt().solve(mixed));
+    return left > 0.0 ? 1.0 / std::sqrt(left) : std::numeric_limits<double>::infinity();
 }
 
 double axesApart(const Frame& a, const Frame& b)

@@ -39,6 +39,7 @@ struct Task {
     std::vector<Observation> observations;  ///< the longest first
     double long_side = 0.0;
     std::optional<FocalPrior> prior;
+    std::optional<Gravity> up;
 };
 
 /// segments   the longest first, as detectSegments gives them
@@ -60,6 +61,9 @@ struct Task {
 
 /// Expectation–maximisation over rotation, focal length and slack from a start; the score is set.
 [[nodiscard]] Frame refined(const Task& task, Frame start);
+
+/// σ of ln f that the segments alone leave, to first order; infinite when they don't tell it.
+[[nodiscard]] double focalSigma(const Task& task, const Frame& frame);
 
 /// Candidates: vanishing points of pairs of long segments; for each of the best, and each focal
 /// length of a grid (or about the prior), the others vote for the turn about it. The best are

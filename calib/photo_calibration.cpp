@@ -1,24 +1,30 @@
 #include "calib/photo_calibration.h"
 
 #include "calib/exif_focal.h"
+#include "calib/exif_gravity.h"
 
 namespace insitu {
 
-CameraEstimate calibratePhoto(const LineSet& lines,
-                              const Photo& photo,
-                              CalibrationOptions options,
-                              const std::string& source)
+CalibrationOptions withExif(CalibrationOptions options, const Photo& photo)
 {
-    const int width = photo.image.codes.width();
-    const int height = photo.image.codes.height();
-    checkLinesMatchPhoto(lines, width, height, source);
-    if (!options.exif_focal_px) {
-        if (const auto exif = focalFromExif(photo.metadata, width, height)) {
+    if (!options.exif_focal_px)
+        if (const auto exif = focalFromExif(
+                photo.metadata, photo.image.codes.width(), photo.image.codes.height())) {
             options.exif_focal_px = exif->focal_px;
             options.exif_focal_sigma = exif->sigma;
         }
-    }
-    return calibrateCamera(lines, options, source);
+    if (options.use_exif_gravity && !options.exif_gravity)
+        options.exif_gravity = gravityFromExif(photo.metadata);
+    return options;
+}
+
+CameraEstimate calibratePhoto(const LineSet& lines,
+                              const Photo& photo,
+                              const CalibrationOptions& options,
+                              const std::string& source)
+{
+    checkLinesMatchPhoto(lines, photo.image.codes.width(), photo.image.codes.height(), source);
+    return calibrateCamera(lines, withExif(options, photo), source);
 }
 
 }  // namespace insitu

@@ -7,12 +7,16 @@
 
 namespace insitu {
 
-/// calibrateCamera for lines marked in `photo`: the picture's size must be that of the lines
-/// (InputError), and the EXIF focal length and its standard deviation are taken from the photograph
-/// (calib/exif_focal.h) unless `options.exif_focal_px` is given.
+/// The options with what the photograph's EXIF tells, where they do not say it themselves: focal
+/// length and its standard deviation (calib/exif_focal.h), and up (calib/exif_gravity.h) unless
+/// `use_exif_gravity` is false.
+[[nodiscard]] CalibrationOptions withExif(CalibrationOptions options, const Photo& photo);
+
+/// calibrateCamera with the photograph's EXIF (withExif) for lines marked in it. InputError when
+/// the picture's size is not that of the lines.
 [[nodiscard]] CameraEstimate calibratePhoto(const LineSet& lines,
                                             const Photo& photo,
-                                            CalibrationOptions options,
+                                            const CalibrationOptions& options,
                                             const std::string& source);
 
 }  // namespace insitu

@@ -1,5 +1,6 @@
 #include "calib/probe_pose.h"
 
+#include "calib/camera_errors.h"
 #include "core/check.h"
 
 #include <fmt/format.h>
@@ -133,12 +134,8 @@ glm::dmat3 outer(glm::dvec3 v)
     return glm::outerProduct(v, v);
 }
 
-/// Covariance in the camera's frame of outline, size and focal length, plus the camera's turn.
-glm::dmat3 covarianceOf(const CameraEstimate& camera,
-                        const SeenBall& ball,
-                        const Outline& seen,
-                        glm::dvec3 center,
-                        double focal_px)
+/// Covariance in the camera's frame of outline and size.
+glm::dmat3 covarianceOf(const SeenBall& ball, glm::dvec3 center, double focal_px)
 {
     const glm::dmat3 by_outline = glm::inverse(*slopeAt(center, ball.radius_m, focal_px));
     const double s2 = ball.center_sigma_px * ball.center_sigma_px;
@@ -146,16 +143,31 @@ glm::dmat3 covarianceOf(const CameraEstimate& camera,
                      ball.radius_sigma_px * ball.radius_sigma_px * outer(by_outline[2]);
     // The whole scene grows with the ball.
     sum += outer(center * (ball.radius_sigma_m / ball.radius_m));
-    const double h = 1e-5;
-    const auto longer = centerOf(seen, ball.radius_m, focal_px * (1.0 + h));
-    const auto shorter = centerOf(seen, ball.radius_m, focal_px * (1.0 - h));
-    if (longer && shorter)
-        sum += outer((*longer - *shorter) / (2.0 * h) * (camera.focal_sigma_px / focal_px));
-    // Turns about three axes, a third of the mean square angle each.
-    const double turn2 = camera.rotation_sigma_rad * camera.rotation_sigma_rad / 3.0;
-    for (const glm::dvec3 axis : {glm::dvec3(1, 0, 0), {0, 1, 0}, {0, 0, 1}})
-        sum += turn2 * outer(glm::cross(axis, center));
     return sum;
+}
+
+double focalOf(const Camera& camera)
+{
+    return 0.5 * (camera.focal_px.x + camera.focal_px.y);
+}
+
+/// The ball's centre in the camera's frame.
+glm::dvec3 centerBefore(const Camera& camera, const SeenBall& ball, const std::string& source)
+{
+    const auto center = centerOf(straightOutline(camera, ball), ball.radius_m, focalOf(camera));
+    if (!center)
+        throw NoAnswerError(source,
+                            fmt::format("no ball in front of the camera has the outline of {:.1f} "
+                                        "px about ({:.1f}, {:.1f})",
+                                        ball.radius_px,
+                                        ball.center_px.x,
+                                        ball.center_px.y));
+    return *center;
+}
+
+glm::dmat3 worldFromCamera(const Camera& camera)
+{
+    return {camera.right, -camera.up, camera.forward};
 }
 
 }  // namespace
@@ -164,28 +176,23 @@ BallPlace placeBall(const CameraEstimate& estimate, const SeenBall& ball, const 
 {
     check(ball, source);
     const Camera& camera = estimate.camera;
-    const double focal = 0.5 * (camera.focal_px.x + camera.focal_px.y);
-    const Outline seen = straightOutline(camera, ball);
-    const auto center = centerOf(seen, ball.radius_m, focal);
-    if (!center)
-        throw NoAnswerError(source,
-                            fmt::format("no ball in front of the camera has the outline of {:.1f} "
-                                        "px about ({:.1f}, {:.1f})",
-                                        ball.radius_px,
-                                        ball.center_px.x,
-                                        ball.center_px.y));
-    const glm::dmat3 world_from_camera(camera.right, -camera.up, camera.forward);
+    const glm::dvec3 center = centerBefore(camera, ball, source);
+    const glm::dmat3 world_from_camera = worldFromCamera(camera);
     BallPlace place;
-    place.center_m = camera.position_m + world_from_camera * *center;
-    place.distance_m = glm::length(*center);
-    const glm::dmat3 in_camera = covarianceOf(estimate, ball, seen, *center, focal);
-    const glm::dvec3 ray = *center / place.distance_m;
-    place.distance_sigma_m = std::sqrt(glm::dot(ray, in_camera * ray));
-    place.covariance = world_from_camera * in_camera * glm::transpose(world_from_camera);
-    for (int k = 0; k < 3; ++k) {
-        place.covariance[k][k] += estimate.position_sigma_m[k] * estimate.position_sigma_m[k];
+    place.center_m = camera.position_m + world_from_camera * center;
+    place.distance_m = glm::length(center);
+    const glm::dmat3 by_outline = covarianceOf(ball, center, focalOf(camera));
+    const glm::dmat3 by_camera = covarianceFromCamera(
+        estimate, [&](const Camera& other) { return centerBefore(other, ball, source); });
+    const glm::dvec3 ray = center / place.distance_m;
+    place.distance_sigma_m = std::sqrt(glm::dot(ray, (by_outline + by_camera) * ray));
+    place.covariance =
+        world_from_camera * by_outline * glm::transpose(world_from_camera) +
+        covarianceFromCamera(estimate, [&](const Camera& other) {
+            return other.position_m + worldFromCamera(other) * centerBefore(other, ball, source);
+        });
+    for (int k = 0; k < 3; ++k)
         place.sigma_m[k] = std::sqrt(place.covariance[k][k]);
-    }
     if (place.distance_sigma_m > kWeakDistance * place.distance_m)
         place.findings.push_back(
             {Severity::Warning,

@@ -40,9 +40,8 @@ struct BallPlace {
 /// and a lens that bends lines is undone at the outline's centre: right to a share (r/R_half)² of λ
 /// of the radius, r the outline's radius and R_half half the diagonal.
 ///
-/// The covariance is first order: outline and size as given; the camera's own focal length,
-/// rotation and position by their stated deviations as if independent, which overstates what they
-/// do together.
+/// The covariance is first order: outline and size as given, the camera's errors by its full
+/// covariance (calib/camera_errors.h).
 ///
 /// Findings:
 ///   probe-place-weak    the distance is uncertain by more than 5 %

@@ -3,6 +3,8 @@
 #include "calib/answer_doubt.h"
 #include "calib/line_assignment.h"
 #include "calib/manhattan_search.h"
+#include "calib/right_angle.h"
+#include "calib/second_frame.h"
 
 #include <fmt/format.h>
 #include <glm/gtc/constants.hpp>
@@ -64,6 +66,16 @@ void object(const RoomLineOptions& options, bool focal_known, RoomLines& lines)
                         "{:.1f} asked for)",
                         lines.margin,
                         least_margin));
+    const double most_off =
+        (focal_known ? options.most_angle_sigmas_with_prior : options.most_angle_sigmas) *
+        lines.angle_sigma;
+    const double angle_off = std::abs(lines.angle_off);
+    if (angle_off > most_off && angle_off > glm::radians(options.least_angle_off_deg))
+        add(
+            fmt::format("x and z do not look at right angles (the edges alone say {:.0f} ± {:.0f}°"
+                        "): a wall or furniture that stands askew is taken for one of them",
+                        90.0 + glm::degrees(lines.angle_off),
+                        glm::degrees(lines.angle_sigma)));
     if (lines.focal_at_limit) add("the focal length ran into the limits of what a lens can be");
     if (!focal_known && lines.focal_doubt > options.most_focal_doubt)
         add(
@@ -98,6 +110,13 @@ Findings RoomLineOptions::validate() const
         fmt::format("least_margin and least_margin_with_prior are {} and {}, must not be negative",
                     least_margin,
                     least_margin_with_prior));
+    check(
+        most_angle_sigmas > 0.0 && most_angle_sigmas_with_prior > 0.0 && least_angle_off_deg >= 0.0,
+        fmt::format("most_angle_sigmas, most_angle_sigmas_with_prior and least_angle_off_deg are "
+                    "{}, {} and {}, must be positive",
+                    most_angle_sigmas,
+                    most_angle_sigmas_with_prior,
+                    least_angle_off_deg));
     check(least_explained >= 0.0 && least_explained <= 1.0,
           fmt::format("least_explained is {}, must lie in [0, 1]", least_explained));
     return problems;
@@ -109,8 +128,9 @@ std::optional<RoomLines> findRoomLines(const EncodedImage& image,
 {
     requireValid(options.validate(), "room line options");
     const std::vector<DetectedSegment> segments = detectSegments(image, options.detection);
-    const manhattan::Task task =
+    manhattan::Task task =
         manhattan::makeTask(segments, image.codes.width(), image.codes.height(), prior);
+    task.up = options.up;
     std::vector<manhattan::Frame> frames = manhattan::search(task);
     if (frames.empty()) return std::nullopt;
 
@@ -131,6 +151,12 @@ std::optional<RoomLines> findRoomLines(const EncodedImage& image,
     lines.detected = static_cast<int>(segments.size());
     lines.focal_doubt = doubt.focal;
     lines.rotation_doubt = doubt.rotation;
+    lines.doubt = doubt.covariance;
+    const manhattan::RightAngle angle = manhattan::rightAngle(task, best, options.principal_sigma);
+    lines.angle_off = angle.off;
+    lines.angle_sigma = angle.sigma;
+    if (const auto second = manhattan::secondFrame(task, best, options.least_margin))
+        lines.second = SecondDirections{second->turn, second->segments, second->evidence};
     object(options, prior.has_value(), lines);
     return lines;
 }

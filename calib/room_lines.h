@@ -1,5 +1,6 @@
 #pragma once
 
+#include "calib/camera_errors.h"
 #include "calib/line_segments.h"
 #include "calib/orientation.h"
 #include "calib/segment_detection.h"
@@ -22,6 +23,8 @@ struct RoomLineOptions {
     /// How far the optical axis may be from the picture's middle, 1σ as a share of the long side:
     /// what the answer moves by with it is part of its doubt. [0, 0.2]
     double principal_sigma = 0.01;
+    /// Up by an accelerometer: helps to choose between answers, is no part of one.
+    std::optional<Gravity> up;
     // What an answer must show to be vouched for. Chosen so that of the answers about photographs,
     // views made from them and panoramas few are wrong (docs/validation.md, bench/calib_auto).
 
@@ -33,11 +36,25 @@ struct RoomLineOptions {
     /// the focal length and with one. >= 0
     double least_margin = 10.0;
     double least_margin_with_prior = 2.0;
+    /// x and z must be at right angles for all that the edges alone say of the angle between them:
+    /// no more than so many standard deviations off, unless that is less than a few degrees.
+    /// Without a prior of the focal length the right angle is what decides it. > 0
+    double most_angle_sigmas = 1.5;
+    double most_angle_sigmas_with_prior = 3.0;
+    double least_angle_off_deg = 3.0;
     /// Share of the edges, the long ones counting more, that must follow the room's axes. [0, 1]
     double least_explained = 0.45;
 
     /// Every problem at once: "room-line-options", and those of the detection.
     [[nodiscard]] Findings validate() const;
+};
+
+/// A second pair of horizontal directions at right angles that many edges run along: a wall or
+/// furniture that stands askew. Not used in the answer.
+struct SecondDirections {
+    double turn_rad = 0.0;  ///< from x and z, counter-clockwise seen from above; (0, π/2)
+    int segments = 0;
+    double evidence = 0.0;  ///< natural logarithm, against edges of any direction
 };
 
 /// Segments of a photograph, each with its axis of the room, and how far they can be trusted.
@@ -51,7 +68,13 @@ struct RoomLines {
     double explained = 0.0;       ///< share of them that follows an axis, by weight
     double margin = 0.0;          ///< evidence over the best other answer
     double focal_doubt = 0.0;     ///< σ of ln f
-    double rotation_doubt = 0.0;  ///< radians
+    double rotation_doubt = 0.0;  ///< radians, root mean square angle
+    OrientationCovariance doubt{};
+    std::optional<SecondDirections> second;
+    /// What the edges alone say of the angle between x and z: by how much it is more than a right
+    /// one, and how well they tell. Radians
+    double angle_off = 0.0;
+    double angle_sigma = 0.0;
     /// Why the answer should not be used; empty when it should.
     std::vector<std::string> objections;
 };
@@ -64,9 +87,14 @@ struct RoomLines {
 /// candidates are refined by expectation–maximisation over rotation and focal length. Principal
 /// point: the picture's middle. Deterministic.
 ///
-/// The doubts: the answer is found again with the segments drawn anew with repetition (24 times,
-/// fixed seed) and with the principal point moved by `principal_sigma`; its scatter is the doubt.
-/// The objections compare margin, doubts and explained share with the options. The focal length's
+/// The doubts: the answer is found again with parts of the picture drawn anew with repetition (48
+/// times, fixed seed) and with the principal point moved by `principal_sigma`; its scatter is the
+/// doubt. Parts and not segments, since the edges of one thing that stands askew agree.
+/// Rooms with more horizontal directions than two (Atlanta worlds): the strongest further pair is
+/// told when its evidence is at least `least_margin`.
+///
+/// The objections compare margin, doubts, the angle between x and z and explained share with the
+/// options. The focal length's
 /// doubt does not count with a prior.
 ///
 /// prior   focal length from EXIF; without one the picture must show it
@@ -80,11 +108,10 @@ struct RoomLines {
 /// follow the same three directions. A stroke without an edge nearby stays as it is.
 struct CompletedLines {
     LineSet lines;
-    double sigma_px = 1.0;        ///< of an end point, as the segments' own residuals show
-    int snapped = 0;              ///< strokes that were moved onto an edge
-    int added = 0;                ///< segments that no stroke named
-    double focal_doubt = 0.0;     ///< as in RoomLines
-    double rotation_doubt = 0.0;  ///< radians
+    double sigma_px = 1.0;          ///< of an end point, as the segments' own residuals show
+    int snapped = 0;                ///< strokes that were moved onto an edge
+    int added = 0;                  ///< segments that no stroke named
+    OrientationCovariance doubt{};  ///< as in RoomLines
 };
 
 /// strokes   at least two of two axes, as for calib/camera_solve.h; distortion must be 0 (an edge

@@ -142,9 +142,7 @@ std::optional<CompletedLines> completeStrokes(const LineSet& strokes,
     result.lines.segments.insert(
         result.lines.segments.end(), assigned.segments.begin(), assigned.segments.end());
     result.sigma_px = endSigma(result.lines, *frame);
-    const manhattan::Doubt doubt = manhattan::doubtOf(task, *frame, options.principal_sigma);
-    result.focal_doubt = doubt.focal;
-    result.rotation_doubt = doubt.rotation;
+    result.doubt = manhattan::doubtOf(task, *frame, options.principal_sigma).covariance;
     return result;
 }
 

@@ -315,6 +315,9 @@ void registerCalibrate(CLI::App& app, Context& context)
     command->add_flag("--ignore-exif-focal",
                       arguments->ignore_exif_focal,
                       "Use the lines alone where they suffice; EXIF only checks");
+    command->add_flag("--ignore-exif-gravity{false}",
+                      arguments->options.use_exif_gravity,
+                      "Don't use the accelerometer that telephones (Apple's) write into EXIF");
     addAutomaticOptions(*command, *arguments);
     addBallOptions(*command, *arguments);
     context.addCommonOptions(*command);

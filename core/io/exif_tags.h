@@ -20,6 +20,7 @@ inline constexpr std::uint16_t kPixelYDimension = 0xA003;
 inline constexpr std::uint16_t kFocalPlaneXResolution = 0xA20E;
 inline constexpr std::uint16_t kFocalPlaneUnit = 0xA210;
 inline constexpr std::uint16_t kFocalLength35mm = 0xA405;
+inline constexpr std::uint16_t kLensModel = 0xA434;
 
 /// Width of the 35 mm film frame, which we set against the image's long side.
 inline constexpr double kFilmWidthMm = 36.0;

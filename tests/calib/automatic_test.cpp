@@ -1,4 +1,6 @@
 #include "calib/automatic_calibration.h"
+#include "calib/right_angle.h"
+#include "calib/second_frame.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "tests/calib/drawn_room.h"
@@ -216,6 +218,103 @@ TEST(Automatic, StrokesThatTellNoDirectionAreUsedAlone)
     EXPECT_THAT(
         inputErrorOf([&] { (void)calibrateCompleted(strokes, photoOf(image), {}, {}, "bent"); }),
         HasSubstr("distortion"));
+}
+
+/// Edges of a room, and what finds its directions in them.
+struct Edges {
+    Camera camera;
+    std::vector<DetectedSegment> segments{};
+    RandomStream random{92, 0, 0};
+
+    void add(glm::dvec2 from, glm::dvec2 to)
+    {
+        DetectedSegment one;
+        one.from_px = from + 0.3 * glm::dvec2(random.normal(), random.normal());
+        one.to_px = to + 0.3 * glm::dvec2(random.normal(), random.normal());
+        one.sigma_px = 0.3;
+        segments.push_back(one);
+    }
+    /// At a height, along a horizontal direction turned from x, counter-clockwise seen from above.
+    void addTurned(double turn_rad, double height_m)
+    {
+        const glm::dvec3 along(std::cos(turn_rad), 0.0, -std::sin(turn_rad));
+        const glm::dvec3 from(random.uniformDouble() - 0.5, height_m, random.uniformDouble() - 0.5);
+        add(*camera.project(from), *camera.project(from + 0.9 * along));
+    }
+    [[nodiscard]] manhattan::Task task() const
+    {
+        return manhattan::makeTask(segments, camera.width, camera.height, std::nullopt);
+    }
+    [[nodiscard]] manhattan::Frame truth() const
+    {
+        const glm::dmat3 world_from_camera(camera.right, -camera.up, camera.forward);
+        return {glm::transpose(world_from_camera), camera.focal_px.x, glm::radians(0.15), 0.0};
+    }
+};
+
+Edges edgesOf(const synthetic::Room& room)
+{
+    Edges edges{room.camera};
+    for (const LineSegment& segment : room.lines.segments)
+        edges.add(segment.from_px, segment.to_px);
+    return edges;
+}
+
+TEST(Automatic, ASecondPairOfDirectionsIsTold)
+{
+    Edges edges = edgesOf(synthetic::makeRoom({25.0, -12.0, 0.0, 900.0, 1.5}, {8, 8, 8}, 91));
+    for (int i = 0; i < 12; ++i) {  // of any direction
+        const glm::dvec2 at(1200.0 * edges.random.uniformDouble(),
+                            900.0 * edges.random.uniformDouble());
+        const double angle = glm::pi<double>() * edges.random.uniformDouble();
+        edges.add(at, at + 150.0 * glm::dvec2(std::cos(angle), std::sin(angle)));
+    }
+    EXPECT_FALSE(manhattan::secondFrame(edges.task(), edges.truth(), 10.0));
+    // A table turned by 30°.
+    for (int i = 0; i < 8; ++i)
+        edges.addTurned(glm::radians(30.0) + (i % 2 ? glm::half_pi<double>() : 0.0), 0.75);
+    const auto found = manhattan::secondFrame(edges.task(), edges.truth(), 10.0);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(glm::degrees(found->turn), 30.0, 1.0);
+    EXPECT_GE(found->segments, 7);
+    EXPECT_LE(found->segments, 10);
+}
+
+TEST(Automatic, WallsThatAreNotAtRightAnglesShow)
+{
+    // Tilted enough for the uprights to tell the focal length.
+    const synthetic::View view{35.0, -20.0, 0.0, 900.0, 1.5};
+    Edges square = edgesOf(synthetic::makeRoom(view, {10, 10, 10}, 93));
+    const auto right = manhattan::rightAngle(
+        square.task(), manhattan::refined(square.task(), square.truth()), 0.01);
+    EXPECT_LT(std::abs(right.off), 3.0 * right.sigma);
+    EXPECT_LT(glm::degrees(right.sigma), 4.0);
+    EXPECT_NEAR(right.focal_px, 900.0, 4.0 * 900.0 * right.focal_sigma);
+
+    // z encloses 102° with x: with another focal length all three look at right angles, but for
+    // what the uprights say.
+    Edges askew = edgesOf(synthetic::makeRoom({35.0, -10.0, 0.0, 900.0, 1.5}, {12, 6, 0}, 93));
+    for (int i = 0; i < 12; ++i)
+        askew.addTurned(-glm::half_pi<double>() - glm::radians(12.0), 0.15 * i);
+    const std::vector<manhattan::Frame> found = manhattan::search(askew.task());
+    ASSERT_FALSE(found.empty());
+    manhattan::Frame frame = found.front();
+    const glm::dmat3 truth = askew.truth().axes;
+    for (int i = 0; i < 3; ++i)  // its columns in the order of x, y, z
+        for (int k = 0; k < 3; ++k)
+            if (std::abs(glm::dot(found.front().axes[k], truth[i])) > 0.85)
+                frame.axes[i] = found.front().axes[k] *
+                                (glm::dot(found.front().axes[k], truth[i]) > 0.0 ? 1.0 : -1.0);
+    EXPECT_GT(std::abs(frame.focal_px / 900.0 - 1.0), 0.05);
+    // The uprights alone leave room for it; with the true lens there is none.
+    const auto open = manhattan::rightAngle(askew.task(), frame, 0.005);
+    EXPECT_NEAR(glm::degrees(open.off), 12.0, 3.0 * glm::degrees(open.sigma));
+    manhattan::Task known = askew.task();
+    known.prior = FocalPrior{900.0, 0.02};
+    const auto wide = manhattan::rightAngle(known, frame, 0.005);
+    EXPECT_GT(wide.off, 4.0 * wide.sigma);
+    EXPECT_NEAR(glm::degrees(wide.off), 12.0, 3.0 * glm::degrees(wide.sigma));
+    EXPECT_NEAR(wide.focal_px, 900.0, 3.0 * 900.0 * wide.focal_sigma);
 }
 
 TEST(Automatic, UnusableOptionsAreNamedAllAtOnce)

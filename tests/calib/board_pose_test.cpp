@@ -2,30 +2,18 @@
 
 #include "capture/ball_outline.h"
 #include "core/random.h"
+#include "tests/calib/drawn_board.h"
 #include "tests/calib/synthetic_room.h"
 #include "tests/support/errors.h"
 
 #include <gmock/gmock.h>
-#include <opencv2/aruco.hpp>
 
 namespace insitu {
 namespace {
 
 using ::testing::HasSubstr;
 
-const MarkerBoard kBoard{4, 3, 0.05, 0.012};
-
-/// The board lies in the room: its origin, and the directions of its x and y.
-struct Laid {
-    glm::dvec3 origin{0.1, 0.75, -0.1};
-    glm::dvec3 x = glm::normalize(glm::dvec3(1.0, 0.0, 0.25));
-    glm::dvec3 y = glm::normalize(glm::dvec3(-0.25, 0.0, 1.0));
-
-    [[nodiscard]] glm::dvec3 at(glm::dvec2 on_board) const
-    {
-        return origin + x * on_board.x + y * on_board.y;
-    }
-};
+using namespace drawn_board;
 
 std::vector<BoardCorner> exactCorners(const Laid& laid, const Camera& camera)
 {
@@ -44,55 +32,6 @@ void addNoise(std::vector<BoardCorner>& corners, double sigma, RandomStream& ran
 {
     for (BoardCorner& corner : corners)
         corner.seen_px += sigma * glm::dvec2(random.normal(), random.normal());
-}
-
-/// The printed board as a camera sees it, 5 x 5 samples a pixel.
-EncodedImage photograph(const Laid& laid, const Camera& camera)
-{
-    const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50);
-    std::vector<cv::Mat> markers(static_cast<std::size_t>(kBoard.columns * kBoard.rows));
-    for (std::size_t i = 0; i < markers.size(); ++i)
-        cv::aruco::drawMarker(dictionary, static_cast<int>(i), 60, markers[i]);
-    const double pitch = kBoard.marker_m + kBoard.gap_m;
-    const glm::dvec3 normal = glm::cross(laid.x, laid.y);
-    const auto shade = [&](glm::dvec2 pixel) {
-        const glm::dvec3 ray = camera.rayDirection(pixel);
-        const double t = glm::dot(laid.origin - camera.position_m, normal) / glm::dot(ray, normal);
-        if (t <= 0.0) return 120.0;
-        const glm::dvec3 off = camera.position_m + ray * t - laid.origin;
-        const glm::dvec2 p(glm::dot(off, laid.x), glm::dot(off, laid.y));
-        const int c = static_cast<int>(std::floor(p.x / pitch));
-        const int r = static_cast<int>(std::floor(p.y / pitch));
-        const glm::dvec2 in = p - glm::dvec2(c, r) * pitch;
-        if (p.x < -0.02 || p.y < -0.02 || c > kBoard.columns || r > kBoard.rows) return 120.0;
-        if (c < 0 || r < 0 || c >= kBoard.columns || r >= kBoard.rows || in.x >= kBoard.marker_m ||
-            in.y >= kBoard.marker_m)
-            return 220.0;
-        const cv::Mat& marker = markers[static_cast<std::size_t>(r * kBoard.columns + c)];
-        const int mx = static_cast<int>(in.x / kBoard.marker_m * 60.0);
-        const int my = static_cast<int>(in.y / kBoard.marker_m * 60.0);
-        return marker.at<std::uint8_t>(my, mx) > 0 ? 220.0 : 30.0;
-    };
-    EncodedImage image;
-    image.codes = Image<glm::u16vec3>(camera.width, camera.height);
-    for (int y = 0; y < camera.height; ++y)
-        for (int x = 0; x < camera.width; ++x) {
-            double sum = 0.0;
-            for (int i = 0; i < 25; ++i)
-                sum += shade({x + 0.1 + 0.2 * (i % 5), y + 0.1 + 0.2 * (i / 5)}) / 25.0;
-            image.codes(x, y) = glm::u16vec3(static_cast<std::uint16_t>(sum + 0.5));
-        }
-    return image;
-}
-
-Camera roomCamera()
-{
-    return Camera::lookAt({0.9, 1.5, 1.6}, {0.2, 0.7, 0.0}, 1100.0, 900, 700);
-}
-
-Camera closeCamera()
-{
-    return Camera::lookAt({-0.25, 1.15, 0.55}, {0.2, 0.8, 0.0}, 1400.0, 900, 700);
 }
 
 TEST(FindBoard, CornersAreWhereTheyWerePrinted)

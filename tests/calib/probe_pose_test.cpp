@@ -133,6 +133,48 @@ TEST(ProbePose, TheCamerasOwnErrorsAreInIt)
     EXPECT_NEAR(glm::dot(found.sigma_m, found.sigma_m), expected, 0.02 * expected);
 }
 
+TEST(ProbePose, WhatACalibrationGetsWrongTogetherIsStated)
+{
+    constexpr int kDraws = 400;
+    int within_one[3] = {};
+    int within_two[3] = {};
+    double stated = 0.0;
+    double as_if_independent = 0.0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+        synthetic::Room room =
+            synthetic::makeRoom({33.0, -16.0, 1.0, 900.0, 1.5}, {5, 5, 5}, 4000 + draw);
+        const glm::dvec3 center(0.25, 0.4, -0.3);
+        RandomStream random(45, 0, static_cast<std::uint64_t>(draw));
+        SeenBall ball = seen(predictBallOutline(center, 0.1, room.camera), 0.1);
+        ball.center_sigma_px = 0.1;
+        ball.radius_sigma_px = 0.05;
+        ball.center_px += 0.1 * glm::dvec2(random.normal(), random.normal());
+        ball.radius_px += 0.05 * random.normal();
+        synthetic::addNoise(room.lines, 2.0, random);
+        CalibrationOptions options;
+        options.segment_sigma_px = 2.0;
+        options.principal_sigma = 0.0;
+        CameraEstimate found = calibrateCamera(room.lines, options, "room");
+        const BallPlace place = placeBall(found, ball, "test");
+        for (int k = 0; k < 3; ++k) {
+            const double off = std::abs(place.center_m[k] - center[k]) / place.sigma_m[k];
+            within_one[k] += off < 1.0 ? 1 : 0;
+            within_two[k] += off < 1.96 ? 1 : 0;
+        }
+        stated += glm::dot(place.sigma_m, place.sigma_m);
+        found.covariance = {};
+        const glm::dvec3 other = placeBall(found, ball, "test").sigma_m;
+        as_if_independent += glm::dot(other, other);
+    }
+    // Binomial deviation of 400 draws: 2.3 and 1.1 %; three of them.
+    for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(within_one[k] / static_cast<double>(kDraws), 0.683, 0.07) << k;
+        EXPECT_NEAR(within_two[k] / static_cast<double>(kDraws), 0.95, 0.033) << k;
+    }
+    // Near the origin a turn and the place that follows from it all but cancel.
+    EXPECT_LT(stated, 0.5 * as_if_independent);
+}
+
 TEST(ProbePose, FindingsAndErrors)
 {
     const CameraEstimate camera = exactCamera();

@@ -1,8 +1,10 @@
 #include "core/io/exif.h"
 
 #include "core/io/byte_writer.h"
+#include "core/io/exif_acceleration.h"
 #include "core/io/image_io.h"
 #include "core/random.h"
+#include "tests/support/apple_exif.h"
 #include "tests/support/data.h"
 #include "tests/support/tolerance.h"
 
@@ -208,6 +210,38 @@ TEST(Exif, NoDamageIsFatal)
     }
 }
 
+TEST(Exif, AccelerationPointsUpInTheStoredPicture)
+{
+    // Held with its top to the left: at rest it is pushed towards its right side, which is up.
+    const auto landscape = accelerationFromExif(appleExif({-1.0, 0.0, 0.0}));
+    ASSERT_TRUE(landscape);
+    EXPECT_LT(glm::length(*landscape - glm::dvec3(0.0, -1.0, 0.0)), tolerance::kDouble);
+    // Upright: pushed towards its top, which is the stored picture's left. Looking up a little, the
+    // acceleration has a part along the view.
+    const auto portrait = accelerationFromExif(appleExif({0.0, -0.98, 0.2}, 6));
+    ASSERT_TRUE(portrait);
+    EXPECT_LT(glm::length(*portrait - glm::dvec3(-0.98, 0.0, 0.2)), tolerance::kDouble);
+    EXPECT_FALSE(accelerationFromExif(appleExif({-1, 0, 0}, 1, "iPhone 11 front camera 2.71mm")));
+    EXPECT_FALSE(accelerationFromExif(makeExif({})));
+    EXPECT_FALSE(accelerationFromExif({}));
+}
+
+TEST(Exif, DamagedAccelerationsAreNone)
+{
+    const Bytes block = appleExif({-0.6, 0.0, 0.8});
+    for (std::size_t size = 0; size + 1 < block.size(); ++size)
+        (void)accelerationFromExif(std::span(block).first(size));
+    RandomStream random(3, 0, 0);
+    for (int i = 0; i < 20000; ++i) {
+        Bytes mutated = block;
+        for (int k = 0; k < 4; ++k)
+            mutated[random.below(static_cast<std::uint32_t>(mutated.size()))] =
+                static_cast<std::uint8_t>(random.below(256));
+        const auto read = accelerationFromExif(mutated);
+        EXPECT_TRUE(!read || std::isfinite(glm::length(*read)));
+    }
+}
+
 TEST(Exif, RealCameras)
 {
     INSITU_NEEDS_DATA();
@@ -228,6 +262,11 @@ TEST(Exif, RealCameras)
     EXPECT_EQ(living.metadata.focal_mm, 19.8);
     ASSERT_TRUE(living.metadata.focal_px);
     EXPECT_NEAR(*living.metadata.focal_px, 19.8 / 23.5 * 1500.0, 0.05 * 1264.0);  // APS-C, 23.5 mm
+    // An iPhone 11 held level.
+    const Photo dining = readPhoto(dataFolder() / "brackets/ball_tarik_dining/background.jpg");
+    const auto up = accelerationFromExif(dining.metadata.exif);
+    ASSERT_TRUE(up);
+    EXPECT_LT(glm::length(*up - glm::dvec3(0.001, -0.999, -0.017)), 0.001);
 }
 
 }  // namespace
