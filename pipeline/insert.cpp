@@ -8,6 +8,7 @@
 #include "pipeline/radiance_mesh_stage.h"
 #include "pipeline/stage_cache.h"
 #include "pipeline/stage_parts.h"
+#include "reconstruct/room_bounds.h"
 
 #include <algorithm>
 #include <chrono>
@@ -164,15 +165,14 @@ std::vector<ObjectScene::Object> placeObjects(const Project& project, InsertResu
         const BoundingBox box = boundingBox(object.model.mesh);
         if (const auto finding = extentFinding(box, wanted.model.string()))
             result.findings.push_back(*finding);
-        for (const RoomBox& room : project.room.boxes) {
-            const double slack = 0.005;
-            if (!room.solid && (glm::any(glm::lessThan(box.min, room.min_m - slack)) ||
-                                glm::any(glm::greaterThan(box.max, room.max_m + slack))))
-                result.findings.push_back(
-                    {Severity::Warning,
-                     "object-outside-room",
-                     fmt::format("{} reaches out of the room's box", wanted.model.string())});
-        }
+        const double slack = 0.005;
+        const auto& positions = object.model.mesh.positions;
+        const std::vector<glm::dvec3> points(positions.begin(), positions.end());
+        if (const auto out = reachOutside(project.room, points); out && *out > slack)
+            result.findings.push_back(
+                {Severity::Warning,
+                 "object-outside-room",
+                 fmt::format("{} reaches {:.2f} m out of the room", wanted.model.string(), *out)});
         objects.push_back(std::move(object));
     }
     return objects;

@@ -2,10 +2,12 @@
 
 #include "pipeline/project_json.h"
 #include "pipeline/project_keys.h"
+#include "reconstruct/room_bounds.h"
 
 #include <glm/glm.hpp>
 
 #include <algorithm>
+#include <span>
 
 namespace insitu {
 
@@ -75,24 +77,21 @@ void readCamera(const JsonNode& node, const std::filesystem::path& folder, Proje
     }
 }
 
-/// An object must stand in one of the room's boxes, when there are any: a misplaced decimal point
-/// should not cost a render.
+/// An object must stand in the room, when there is one: a misplaced decimal point should not cost a
+/// render.
 void checkInsideRoom(const JsonNode& objects, const Project& project)
 {
     constexpr double kSlackM = 1e-3;
-    const auto room_count = std::count_if(project.room.boxes.begin(),
-                                          project.room.boxes.end(),
-                                          [](const RoomBox& box) { return !box.solid; });
-    if (room_count == 0) return;
     for (std::size_t i = 0; i < project.objects.size(); ++i) {
         const glm::dvec3 p = project.objects[i].position_m;
-        const auto holds = [&](const RoomBox& box) {
-            return !box.solid && glm::all(glm::greaterThanEqual(p, box.min_m - kSlackM)) &&
-                   glm::all(glm::lessThanEqual(p, box.max_m + kSlackM));
-        };
-        if (std::none_of(project.room.boxes.begin(), project.room.boxes.end(), holds))
+        const auto out = reachOutside(project.room, std::span(&p, 1));
+        if (out && *out > kSlackM)
             objects.at(i).fail(
-                fmt::format("position_m [{}, {}, {}] lies outside the room's box", p.x, p.y, p.z));
+                fmt::format("position_m [{}, {}, {}] lies {:.3g} m or more outside the room",
+                            p.x,
+                            p.y,
+                            p.z,
+                            *out));
     }
 }
 

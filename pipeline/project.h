@@ -82,7 +82,8 @@ struct Project {
 
 /// Reads and checks a project file (docs/file_format.md). InputError: file, position
 /// ("objects[0].scale"), cause, remedy (a misspelt key gets a suggestion). Every file that the
-/// project names must exist; an object's position must lie in the room's box when there is one.
+/// project names must exist; an object's position must lie in the room when something encloses one
+/// (reconstruct/room_bounds.h).
 [[nodiscard]] Project readProject(const std::filesystem::path& path);
 
 /// Reads a file that holds what `light.probe` holds, paths relative to it. InputError as

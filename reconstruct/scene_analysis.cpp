@@ -1,3 +1,4 @@
+#include "reconstruct/scene_linear.h"
 #include "reconstruct/scene_solve_state.h"
 
 #include <Eigen/Eigenvalues>
@@ -9,8 +10,6 @@ namespace insitu {
 
 namespace {
 
-/// Directions of this share of the greatest eigenvalue, columns scaled alike, count as left open.
-constexpr double kOpen = 1e-10;
 /// Components of an open direction above this share name an unknown.
 constexpr double kNamed = 0.1;
 /// A direction of an observation that the others control by less than this is not tested.
@@ -42,79 +41,6 @@ double manyChiSquareQuantile(int degrees)
     const double cube = 1.0 - 2.0 / (9.0 * k) + kNormal99 * std::sqrt(2.0 / (9.0 * k));
     return k * cube * cube * cube;
 }
-
-/// All equations at the state: rows of each, residuals and derivatives in standard deviations.
-struct LinearSystem {
-    Eigen::MatrixXd jacobian;
-    Eigen::VectorXd residuals;
-    std::vector<Eigen::Index> first_row;  ///< of each equation
-};
-
-LinearSystem linearise(const SceneState& state)
-{
-    LinearSystem system;
-    Eigen::Index rows = 0;
-    for (const auto& equation : state.equations) {
-        system.first_row.push_back(rows);
-        rows += equation->size;
-    }
-    system.jacobian.setZero(rows, static_cast<Eigen::Index>(state.values.size()));
-    system.residuals.setZero(rows);
-    EquationJacobian part;
-    for (std::size_t e = 0; e < state.equations.size(); ++e) {
-        const SceneEquation& equation = *state.equations[e];
-        double residuals[2] = {0.0, 0.0};
-        if (!evaluateEquation(
-                equation, state.camera, *state.layout, state.values, state.poses, residuals, &part))
-            continue;
-        for (int r = 0; r < equation.size; ++r) {
-            const Eigen::Index row = system.first_row[e] + r;
-            system.residuals[row] = residuals[r];
-            for (std::size_t u = 0; u < equation.unknowns.size(); ++u)
-                system.jacobian(row, static_cast<Eigen::Index>(equation.unknowns[u])) =
-                    part(r, static_cast<Eigen::Index>(u));
-        }
-    }
-    return system;
-}
-
-/// What a set of equations determines: covariance on what it does, basis of what it leaves open.
-struct Determined {
-    Eigen::VectorXd scale;       ///< of each unknown, so that all weigh alike
-    Eigen::MatrixXd covariance;  ///< pseudo-inverse of the normal equations
-    Eigen::MatrixXd open;        ///< columns: open directions, in scaled unknowns
-
-    explicit Determined(const Eigen::MatrixXd& jacobian)
-    {
-        const Eigen::Index n = jacobian.cols();
-        scale.resize(n);
-        for (Eigen::Index i = 0; i < n; ++i) {
-            const double norm = jacobian.col(i).norm();
-            scale[i] = norm > 0.0 ? 1.0 / norm : 1.0;
-        }
-        const Eigen::MatrixXd scaled = jacobian * scale.asDiagonal();
-        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled.transpose() * scaled);
-        const Eigen::VectorXd& values = solver.eigenvalues();
-        const double limit = kOpen * std::max(values.size() > 0 ? values[n - 1] : 0.0, 1e-300);
-        Eigen::Index count = 0;
-        while (count < n && !(values[count] > limit))
-            ++count;
-        open = solver.eigenvectors().leftCols(count);
-        const Eigen::MatrixXd basis =
-            scale.asDiagonal() * solver.eigenvectors().rightCols(n - count);
-        covariance = basis * values.tail(n - count).cwiseInverse().asDiagonal() * basis.transpose();
-    }
-
-    /// Standard deviation of gradient · unknowns; nothing when it is left open.
-    [[nodiscard]] std::optional<double> sigma(const Eigen::VectorXd& gradient) const
-    {
-        const Eigen::VectorXd scaled = scale.cwiseProduct(gradient);
-        if (open.cols() > 0 &&
-            (open.transpose() * scaled).norm() > 1e-5 * std::max(scaled.norm(), 1e-300))
-            return std::nullopt;
-        return std::sqrt(std::max(0.0, gradient.dot(covariance * gradient)));
-    }
-};
 
 /// Test of one equation against all others.
 struct Test {
@@ -325,7 +251,7 @@ void findDoubtfulSizes(const SceneState& state, const SceneEstimate& estimate, F
 
 }  // namespace
 
-SceneEstimate analyseScene(const SceneState& state)
+SceneEstimate analyseScene(const SceneState& state, std::span<const Camera> camera_errors)
 {
     SceneEstimate estimate;
     estimate.solution = state.solution;
@@ -335,7 +261,8 @@ SceneEstimate analyseScene(const SceneState& state)
                                      fmt::format("the solution did not settle in {} iterations",
                                                  state.solution.iterations)});
     LinearSystem system = linearise(state);
-    const Determined determined(system.jacobian);
+    Determined determined(system.jacobian);
+    determined.shifts = cameraShifts(state, system, determined, camera_errors);
     std::vector<Test> tests;
     for (std::size_t e = 0; e < state.equations.size(); ++e) {
         const SceneEquation& equation = *state.equations[e];

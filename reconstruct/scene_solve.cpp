@@ -238,9 +238,9 @@ std::vector<SolvedPrimitive> SceneSolver::primitives() const
     return solved;
 }
 
-SceneEstimate SceneSolver::estimate() const
+SceneEstimate SceneSolver::estimate(std::span<const Camera> camera_errors) const
 {
-    return analyseScene(impl_->state);
+    return analyseScene(impl_->state, camera_errors);
 }
 
 const SceneGraph& SceneSolver::graph() const

@@ -7,6 +7,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,8 @@ struct ConstraintFit {
     double redundancy = 0.0;
 };
 
-/// A solved scene with what can be said of it. Standard deviations are those of the marks,
-/// carried through; the camera counts as known.
+/// A solved scene with what can be said of it. Standard deviations are those of the marks and of
+/// the camera, to first order; constraints are tested as if the camera were exact.
 ///
 /// Findings: "reconstruct-not-converged", "reconstruct-undetermined" (numbers that the constraints
 /// leave open: they keep their start as far as they can), "reconstruct-weak" (a size less certain
@@ -81,7 +82,9 @@ public:
     /// Where everything stands, without the analysis: quick.
     [[nodiscard]] std::vector<SolvedPrimitive> primitives() const;
     /// The same with all that is known of it: one dense decomposition.
-    [[nodiscard]] SceneEstimate estimate() const;
+    /// camera_errors   cameras that are one standard deviation off, each along one of the
+    ///                 independent directions of the camera's error; none: it counts as exact
+    [[nodiscard]] SceneEstimate estimate(std::span<const Camera> camera_errors = {}) const;
     [[nodiscard]] const SceneGraph& graph() const;
 
 private:

@@ -3,6 +3,8 @@
 #include "reconstruct/scene_equations.h"
 #include "reconstruct/scene_solve.h"
 
+#include <span>
+
 namespace insitu {
 
 /// What the solver knows at its present state. Private to this module.
@@ -17,6 +19,7 @@ struct SceneState {
 };
 
 /// Standard deviations, redundancies and tests at the state (scene_analysis.cpp).
-[[nodiscard]] SceneEstimate analyseScene(const SceneState& state);
+[[nodiscard]] SceneEstimate analyseScene(const SceneState& state,
+                                         std::span<const Camera> camera_errors);
 
 }  // namespace insitu

@@ -1,5 +1,5 @@
 #include "apps/cli/command.h"
-#include "calib/camera_solve.h"
+#include "calib/camera_formats.h"
 #include "calib/line_segments.h"
 #include "core/color.h"
 #include "core/io/image_io.h"
@@ -212,13 +212,48 @@ Description describeProject(const fs::path& path)
     return description;
 }
 
+/// Ours and other programs' (calib/camera_formats.h).
+Description describeCamera(const fs::path& path)
+{
+    const CameraEstimate estimate = readCameraFile(path);
+    const Camera& camera = estimate.camera;
+    Description description;
+    description.findings = estimate.findings;
+    Json& facts = description.facts;
+    facts["kind"] = "camera";
+    facts["width"] = camera.width;
+    facts["height"] = camera.height;
+    facts["focal_px"] = {camera.focal_px.x, camera.focal_px.y};
+    facts["principal_point_px"] = {camera.principal_px.x, camera.principal_px.y};
+    if (camera.division != 0.0) facts["division"] = camera.division;
+    facts["position_m"] = toList(camera.position_m);
+    facts["forward"] = toList(camera.forward);
+    // Zero: the format holds none.
+    if (estimate.focal_sigma_px > 0.0) facts["focal_px_sigma"] = estimate.focal_sigma_px;
+    if (estimate.position_sigma_m != glm::dvec3(0.0))
+        facts["position_m_sigma"] = toList(estimate.position_sigma_m);
+    return description;
+}
+
+/// A model, or a scene of which only the camera is of use here. Its size in pixels is in no glTF.
+Description describeGltf(const fs::path& path)
+{
+    const Json json = readJson(path);
+    const JsonNode root(json, path.string());
+    const bool camera = root.has("cameras");
+    if (camera && !root.has("meshes")) return describeCamera(path);
+    Description description = describeModel(path);
+    if (camera) description.facts["cameras"] = root.at("cameras").size();
+    return description;
+}
+
 Description describeJson(const fs::path& path)
 {
     const Json json = readJson(path);
     const JsonNode root(json, path.string());
     Description description;
     Json& facts = description.facts;
-    if (root.has("format")) return describeProject(path);
+    if (root.has("format") && !root.has("matrix_world")) return describeProject(path);
     if (root.has("segments")) {
         const LineSet lines = readLineSet(path);
         facts["kind"] = "line segments";
@@ -240,18 +275,8 @@ Description describeJson(const fs::path& path)
             facts["exposure_at_255"].push_back(curve.exposure[c][255]);
         return description;
     }
-    if (root.has("focal_px")) {
-        const CameraEstimate estimate = readCamera(path);
-        facts["kind"] = "camera";
-        facts["width"] = estimate.camera.width;
-        facts["height"] = estimate.camera.height;
-        facts["focal_px"] = {estimate.camera.focal_px.x, estimate.camera.focal_px.y};
-        facts["focal_px_sigma"] = estimate.focal_sigma_px;
-        facts["position_m"] = toList(estimate.camera.position_m);
-        facts["position_m_sigma"] = toList(estimate.position_sigma_m);
-        facts["forward"] = toList(estimate.camera.forward);
-        return description;
-    }
+    for (const char* key : {"focal_px", "cameraTransform", "matrix_world"})
+        if (root.has(key)) return describeCamera(path);
     root.fail("is JSON, but not a project, line segments, a camera or a response curve");
 }
 
@@ -262,6 +287,8 @@ Description describe(const fs::path& path)
         return static_cast<char>(std::tolower(c));
     });
     if (extension == ".json") return describeJson(path);
+    if (extension == ".fspy" || path.filename() == "cameras.txt") return describeCamera(path);
+    if (extension == ".gltf") return describeGltf(path);
     if (isRadianceFile(path)) return describeRadiance(path);
     for (const char* model : {".gltf", ".glb", ".obj", ".fbx", ".dae", ".ply", ".stl", ".3ds"})
         if (extension == model) return describeModel(path);
@@ -291,7 +318,11 @@ void registerInfo(CLI::App& app, Context& context)
     };
     auto arguments = std::make_shared<Arguments>();
     CLI::App* command = app.add_subcommand("info", "What a file holds, as insitu understands it");
-    command->add_option("file", arguments->file, "Photograph, radiance image, model or JSON file")
+    command
+        ->add_option("file",
+                     arguments->file,
+                     "Photograph, radiance image, model, camera (.fspy, COLMAP's cameras.txt, "
+                     ".gltf) or JSON file")
         ->required();
     command->add_option("--json", arguments->json, "Write the facts to this file");
     context.addCommonOptions(*command);

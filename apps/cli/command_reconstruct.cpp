@@ -1,7 +1,10 @@
 #include "apps/cli/command.h"
-#include "calib/camera_solve.h"
+#include "calib/camera_errors.h"
+#include "calib/camera_formats.h"
 #include "calib/picture_drawing.h"
 #include "core/io/image_io.h"
+#include "pipeline/insert.h"
+#include "pipeline/project.h"
 #include "reconstruct/primitive_library.h"
 #include "reconstruct/scene_file.h"
 
@@ -18,6 +21,7 @@ namespace {
 struct ReconstructArguments {
     std::filesystem::path scene;
     std::filesystem::path camera;
+    std::filesystem::path project;
     std::filesystem::path output;
     std::filesystem::path photo;
     std::filesystem::path overlay;
@@ -78,18 +82,28 @@ void runReconstruct(const ReconstructArguments& arguments, Context& context)
     }
     context.checkOutput(arguments.output);
     if (!arguments.overlay.empty()) context.checkOutput(arguments.overlay);
-    const Camera camera = readCamera(arguments.camera).camera;
+    std::filesystem::path photo_file = arguments.photo;
+    CameraEstimate calibrated;
+    if (arguments.project.empty()) {
+        calibrated = readCameraFile(arguments.camera);
+    } else {
+        const Project project = readProject(arguments.project);
+        if (photo_file.empty()) photo_file = project.photo.path;
+        calibrated = solveCamera(project, developed(readPhoto(project.photo.path)), true);
+        context.print(calibrated.findings);
+    }
+    const Camera& camera = calibrated.camera;
     const SceneFile scene = readScene(arguments.scene);
     SceneSolver solver(scene.graph, camera);
     (void)solver.solve();
-    const SceneEstimate estimate = solver.estimate();
+    const SceneEstimate estimate = solver.estimate(errorCameras(calibrated));
     context.print(estimate.findings);
     if (!arguments.overlay.empty()) {
-        const Photo photo = readPhoto(arguments.photo);
+        const Photo photo = developed(readPhoto(photo_file));
         if (photo.image.codes.width() != camera.width ||
             photo.image.codes.height() != camera.height)
             throw InputError(
-                arguments.photo.string(),
+                photo_file.string(),
                 fmt::format("is not of the camera's size, {}x{}", camera.width, camera.height));
         writeEncoded(arguments.overlay, drawOverlay(photo.image, camera, scene, estimate));
     }
@@ -107,21 +121,33 @@ void registerReconstruct(CLI::App& app, Context& context)
         "--print-primitives", arguments->print_primitives, "Print the built-in shapes and stop");
     auto* scene = command->add_option(
         "scene", arguments->scene, "Primitives, what holds between them, marks (.json)");
-    auto* camera = command->add_option("--camera", arguments->camera, "Solved camera (.json)");
+    auto* camera =
+        command->add_option("--camera",
+                            arguments->camera,
+                            "Solved camera (.json, or another format that calibrate --from reads)");
+    auto* project = command->add_option(
+        "--project", arguments->project, "Project (.json) whose photograph and camera these are");
+    project->excludes(camera);
     auto* output = command->add_option("-o,--output", arguments->output, "Room to write (.json)");
-    auto* photo = command->add_option("--photo", arguments->photo, "Photograph for --overlay");
-    command->add_option("--overlay", arguments->overlay, "Photograph with the room's edges (.png)")
-        ->needs(photo);
+    auto* photo = command->add_option(
+        "--photo", arguments->photo, "Photograph for --overlay [the project's]");
+    auto* overlay = command->add_option(
+        "--overlay", arguments->overlay, "Photograph with the room's edges (.png)");
     context.addCommonOptions(*command);
     command->footer(
         "Examples:\n"
         "  insitu reconstruct scene.json --camera camera.json -o room.json\n"
         "  insitu reconstruct scene.json --camera camera.json -o room.json --photo plate.jpg "
-        "--overlay edges.png");
-    command->callback([arguments, &context, print, scene, camera, output] {
+        "--overlay edges.png\n"
+        "  insitu reconstruct scene.json --project project.json -o room.json --overlay edges.png");
+    command->callback([arguments, &context, print, scene, camera, project, output, photo, overlay] {
         if (print->count() == 0)
-            for (const CLI::Option* needed : {scene, camera, output})
+            for (const CLI::Option* needed : {scene, output})
                 if (needed->count() == 0) throw CLI::RequiredError(needed->get_name());
+        if (print->count() == 0 && camera->count() + project->count() == 0)
+            throw CLI::RequiredError("--camera or --project");
+        if (overlay->count() > 0 && photo->count() + project->count() == 0)
+            throw CLI::RequiredError("--photo");
         runReconstruct(*arguments, context);
     });
 }

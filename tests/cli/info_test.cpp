@@ -106,6 +106,38 @@ TEST_F(InfoTest, JsonFiles)
     EXPECT_EQ(factsOf(camera)["position_m"], Json::array({1.0, 2.0, 3.0}));
 }
 
+TEST_F(InfoTest, CamerasOfOtherPrograms)
+{
+    const auto ours = folder_.add("c.json", R"({"image": {"width": 800, "height": 600},
+        "focal_px": [700, 700], "principal_point_px": [400, 300], "position_m": [1, 2, 3],
+        "right": [1, 0, 0], "up": [0, 1, 0], "forward": [0, 0, -1]})");
+    const auto picture = folder_ / "p.png";
+    writeEncoded(picture, {Image<glm::u16vec3>(800, 600, glm::u16vec3(9)), 255});
+    for (const char* name : {"a.fspy", "a.fspy.json", "a.blender.json", "a.gltf", "cameras.txt"}) {
+        const auto file = folder_ / name;
+        const ProgramRun run = runProgram({"calibrate",
+                                           picture.string(),
+                                           "--from",
+                                           ours.string(),
+                                           "-o",
+                                           file.string(),
+                                           "--force"});
+        ASSERT_EQ(run.exit_code, 0) << name << run.messages;
+        const Json facts = factsOf(file);
+        EXPECT_EQ(facts["kind"], "camera") << name;
+        EXPECT_EQ(facts["width"], 800) << name;
+        EXPECT_NEAR(facts["focal_px"][0].get<double>(), 700.0, 1e-6) << name;
+        for (int k = 0; k < 3; ++k)
+            EXPECT_NEAR(facts["position_m"][static_cast<std::size_t>(k)].get<double>(), k + 1, 1e-6)
+                << name;
+        EXPECT_FALSE(facts.contains("focal_px_sigma")) << name;
+    }
+    const ProgramRun broken =
+        runProgram({"info", folder_.add("b.fspy", "fspy, but no more").string()});
+    EXPECT_EQ(broken.exit_code, 1);
+    EXPECT_THAT(broken.messages, HasSubstr("b.fspy"));
+}
+
 TEST_F(InfoTest, WhatItDoesNotKnowIsAFailureWithACause)
 {
     const auto failure = [&](const std::filesystem::path& path) {

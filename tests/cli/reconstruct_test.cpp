@@ -1,5 +1,6 @@
 #include "tests/cli/json_file.h"
 #include "tests/cli/run_program.h"
+#include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -66,6 +67,56 @@ TEST_F(ReconstructSample, FindsTheFurnitureWhereItStands)
         }
     }
     EXPECT_EQ(reconstruct(kSample / "scene.json").exit_code, 1);  // room.json is there
+}
+
+TEST_F(ReconstructSample, AProjectGivesPhotographAndCamera)
+{
+    const auto fromProject = [&](const char* name, std::vector<std::string> more) {
+        std::vector<std::string> arguments = {"reconstruct",
+                                              (kSample / "scene.json").string(),
+                                              "--project",
+                                              (kSample / "project.json").string(),
+                                              "-o",
+                                              (folder_ / name).string()};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return runProgram(arguments);
+    };
+    const std::string edges = (folder_ / "edges.png").string();
+    const ProgramRun run = fromProject("by_project.json", {"--overlay", edges});
+    ASSERT_EQ(run.exit_code, 0) << run.messages;
+    EXPECT_TRUE(fs::exists(edges));
+    ASSERT_EQ(reconstruct(kSample / "scene.json").exit_code, 0);
+    const Json by_project = readJsonFile(folder_ / "by_project.json");
+    const Json by_camera = readJsonFile(folder_ / "room.json");
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t k = 0; k < 3; ++k)  // a camera file holds rounded numbers
+            EXPECT_NEAR(by_project["room"][i]["max_m"][k].get<double>(),
+                        by_camera["room"][i]["max_m"][k].get<double>(),
+                        tolerance::kDouble * 1e3);
+    // The camera's own errors are in the sizes': with an exact one they are less.
+    Json exact = readJsonFile(folder_ / "camera.json");
+    for (const char* key : {"covariance",
+                            "focal_px_sigma",
+                            "principal_point_px_sigma",
+                            "position_m_sigma",
+                            "rotation_sigma_deg",
+                            "turn_sigma_deg"})
+        exact.erase(key);
+    folder_.add("camera.json", exact.dump());
+    ASSERT_EQ(reconstruct(kSample / "scene.json", {"--force"}).exit_code, 0);
+    const Json without = readJsonFile(folder_ / "room.json");
+    const auto sigma = [](const Json& room) {
+        return room["primitives"][1]["position_m_sigma"][2].get<double>();
+    };
+    EXPECT_LT(sigma(without), sigma(by_project));
+    EXPECT_GT(sigma(without), 0.0);
+
+    EXPECT_EQ(fromProject("x.json", {"--camera", (folder_ / "camera.json").string()}).exit_code, 2);
+    EXPECT_EQ(
+        runProgram(
+            {"reconstruct", (kSample / "scene.json").string(), "-o", (folder_ / "y.json").string()})
+            .exit_code,
+        2);
 }
 
 TEST_F(ReconstructSample, BadScenesEndWithTheirPlaceAndCause)

@@ -431,6 +431,28 @@ TEST_F(ProjectFile, ObjectThatMakesNoSense)
                     j["objects"][0]["position_m"] = {5, 0, 0};
                 }),
                 AllOf(HasSubstr("objects[0]"), HasSubstr("outside the room")));
+    // A room of 4 x 4 m turned by 45°: its corner is 2.83 m away, its walls 2 m.
+    const auto turned = [](double x) {
+        return [x](Json& j) {
+            j["room"] =
+                Json::array({{{"type", "primitive"},
+                              {"shape", "room-box"},
+                              {"solid", false},
+                              {"parameters", {{"width_m", 4}, {"height_m", 2.6}, {"depth_m", 4}}},
+                              {"position_m", {0, 0, 0}},
+                              {"rotation_y_deg", 45}}});
+            j["objects"][0]["position_m"] = {x, 0, 0};
+        };
+    };
+    Json inside = good();
+    turned(2.7)(inside);
+    EXPECT_NO_THROW((void)read(inside));
+    EXPECT_THAT(complaint(turned(2.9)), HasSubstr("outside the room"));
+    EXPECT_THAT(complaint([&](Json& j) {
+                    turned(0.0)(j);
+                    j["objects"][0]["position_m"] = {1.9, 0, 1.9};
+                }),
+                HasSubstr("outside the room"));
     EXPECT_THAT(complaint([](Json& j) { j["objects"][0]["pivot"] = "center"; }),
                 HasSubstr("bottom-center"));
     EXPECT_THAT(complaint([](Json& j) {

@@ -1,9 +1,14 @@
 #include "reconstruct/scene_proxy.h"
 
+#include "reconstruct/primitive_library.h"
+#include "reconstruct/room_bounds.h"
 #include "tests/support/tolerance.h"
 
+#include <glm/gtc/constants.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <span>
 
 namespace insitu {
 namespace {
@@ -124,6 +129,44 @@ TEST(SceneProxy, PlaneIsSeenFromBothSidesAndMeshByItsTriangles)
     EXPECT_EQ(proxy.faces()[on_mesh->face].name, "panel");
     // The other half of the parallelogram is not part of the triangle.
     EXPECT_FALSE(proxy.intersect({0.5, 1.8, -1}, {0, 0, -1}));
+}
+
+RoomPrimitive standing(const char* shape, const std::vector<double>& sizes, double turn_rad)
+{
+    const PrimitiveShape& found = builtinPrimitives().at(shape);
+    RoomPrimitive primitive;
+    primitive.faces = placedFaces(found, sizes, {1.0, 0.0, 0.0}, turn_rad);
+    primitive.two_sided = found.two_sided;
+    primitive.solid = found.solid;
+    return primitive;
+}
+
+TEST(ReachOutside, IsTheLeastWayBackThroughAWall)
+{
+    const auto reach = [](const RoomDescription& room, glm::dvec3 p) {
+        return reachOutside(room, std::span(&p, 1));
+    };
+    RoomDescription room;
+    EXPECT_FALSE(reach(room, {0, 0, 0}));
+    room.primitives.push_back(standing("box", {1, 1, 1}, 0.0));
+    EXPECT_FALSE(reach(room, {0, 0, 0}));  // furniture encloses nothing
+
+    // 4 x 2.5 x 4 m about (1, 0, 0), turned by 45°: corners at 2.83 m, walls at 2 m.
+    room.primitives.push_back(standing("room-box", {4, 2.5, 4}, glm::quarter_pi<double>()));
+    EXPECT_NEAR(*reach(room, {3.8, 1.0, 0.0}), 0.0, tolerance::kDouble);
+    EXPECT_NEAR(*reach(room, {1.0, -0.2, 0.0}), 0.2, tolerance::kDouble);
+    const double along = 3.0 / std::sqrt(2.0);
+    EXPECT_NEAR(*reach(room, {1.0 + along, 1.0, along}), 1.0, 10 * tolerance::kDouble);
+    // A second room beside it.
+    room.boxes.push_back({{2, 0, 1}, {5, 2.5, 5}, false, ""});
+    EXPECT_NEAR(*reach(room, {1.0 + along, 1.0, along}), 0.0, tolerance::kDouble);
+    const std::vector<glm::dvec3> several = {{1, 1, 0}, {4, 1, 4}, {4, 2.9, 4}, {4, 1, 5.1}};
+    EXPECT_NEAR(*reachOutside(room, several), 0.4, 10 * tolerance::kDouble);
+    // Without its ceiling it is no longer closed: nobody knows what it encloses.
+    RoomDescription open;
+    open.primitives.push_back(standing("room-box", {4, 2.5, 4}, 0.0));
+    open.primitives[0].faces.erase(open.primitives[0].faces.begin() + 1);
+    EXPECT_FALSE(reach(open, {0, 0, 0}));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "reconstruct/scene_solve.h"
 
+#include "calib/camera_errors.h"
 #include "reconstruct/scene_equations.h"
 #include "tests/support/simulated_scene.h"
 #include "tests/support/tolerance.h"
@@ -191,15 +192,46 @@ TEST(SceneSolver, WhatStandsOnAPrimitiveFollowsIt)
     EXPECT_NEAR(relative(after).y, after[3].parameters[1].value, 1e-12);
 }
 
+/// How often the numbers of solved scenes lie within their stated deviations.
+struct Coverage {
+    int within1 = 0;
+    int within2 = 0;
+    int numbers = 0;
+
+    void count(const SolvedNumber& found, double wanted)
+    {
+        ASSERT_TRUE(found.sigma);
+        if (*found.sigma < 1e-12) return;
+        const double off = std::abs(found.value - wanted) / *found.sigma;
+        within1 += off < 1.0;
+        within2 += off < 1.959964;
+        ++numbers;
+    }
+    void count(const SceneEstimate& estimate, const std::vector<SolvedPrimitive>& truth)
+    {
+        for (std::size_t p = 0; p < truth.size(); ++p) {
+            for (std::size_t k = 0; k < truth[p].parameters.size(); ++k)
+                count(estimate.primitives[p].parameters[k], truth[p].parameters[k].value);
+            for (std::size_t k = 0; k < 3; ++k)
+                count(estimate.primitives[p].position_m[k], truth[p].position_m[k].value);
+            count(estimate.primitives[p].rotation_y_rad, truth[p].rotation_y_rad.value);
+        }
+    }
+    /// Within three standard errors of what a normal distribution gives.
+    void expectNormal(double independent) const
+    {
+        EXPECT_NEAR(within1 / double(numbers), 0.6827, 3 * std::sqrt(0.217 / independent));
+        EXPECT_NEAR(within2 / double(numbers), 0.95, 3 * std::sqrt(0.0475 / independent));
+    }
+};
+
 // Stated standard deviations cover the truth as often as they should.
 TEST(SceneEstimate, SigmasCoverTheTruth)
 {
     const Camera view = camera();
     SceneGraph clean = furnishedRoom();
     const auto truth = placedByContacts(clean, view);
-    int within1 = 0;
-    int within2 = 0;
-    int numbers = 0;
+    Coverage coverage;
     double factor = 0.0;
     constexpr int kDraws = 150;
     for (int draw = 0; draw < kDraws; ++draw) {
@@ -210,27 +242,53 @@ TEST(SceneEstimate, SigmasCoverTheTruth)
         (void)solver.solve();
         const SceneEstimate estimate = solver.estimate();
         factor += estimate.variance_factor / kDraws;
-        const auto count = [&](const SolvedNumber& found, double wanted) {
-            ASSERT_TRUE(found.sigma);
-            if (*found.sigma < 1e-12) return;
-            const double off = std::abs(found.value - wanted) / *found.sigma;
-            within1 += off < 1.0;
-            within2 += off < 1.959964;
-            ++numbers;
-        };
-        for (std::size_t p = 0; p < truth.size(); ++p) {
-            for (std::size_t k = 0; k < truth[p].parameters.size(); ++k)
-                count(estimate.primitives[p].parameters[k], truth[p].parameters[k].value);
-            for (std::size_t k = 0; k < 3; ++k)
-                count(estimate.primitives[p].position_m[k], truth[p].position_m[k].value);
-            count(estimate.primitives[p].rotation_y_rad, truth[p].rotation_y_rad.value);
-        }
+        coverage.count(estimate, truth);
     }
     // The numbers of one draw depend on each other: about as many independent ones as unknowns, 25
-    // of 35, in 150 draws; three standard errors of a proportion of those.
-    EXPECT_NEAR(within1 / double(numbers), 0.6827, 3 * std::sqrt(0.217 / (25.0 * kDraws)));
-    EXPECT_NEAR(within2 / double(numbers), 0.95, 3 * std::sqrt(0.0475 / (25.0 * kDraws)));
+    // of 35, in 150 draws.
+    coverage.expectNormal(25.0 * kDraws);
     EXPECT_NEAR(factor, 1.0, 0.05);
+}
+
+TEST(SceneEstimate, TheCamerasErrorsAreInTheSigmas)
+{
+    const Camera view = camera();
+    SceneGraph clean = furnishedRoom();
+    const auto truth = placedByContacts(clean, view);
+    // Focal length 0.6 %, turns 0.2°, place 1.5 cm, lens 0.004; turn and focal length hang
+    // together.
+    CameraEstimate calibrated;
+    CameraCovariance covariance{};
+    const double sigma[] = {0.0035, 0.0035, 0.002, 0.006, 2.0, 2.0, 0.004, 0.015, 0.015, 0.015};
+    for (std::size_t i = 0; i < 10; ++i)
+        covariance[i][i] = sigma[i] * sigma[i];
+    covariance[0][3] = covariance[3][0] = 0.7 * sigma[0] * sigma[3];
+    covariance[1][7] = covariance[7][1] = -0.6 * sigma[1] * sigma[7];
+    calibrated.camera = view;
+    setCovariance(covariance, calibrated);
+    Coverage with;
+    Coverage without;
+    constexpr int kDraws = 400;
+    for (int draw = 0; draw < kDraws; ++draw) {
+        SceneGraph graph = clean;
+        RandomStream random(19, static_cast<std::uint64_t>(draw), 0);
+        observe(graph, view, 1.0, random);
+        CameraStep off{};
+        for (const CameraStep& step : errorSteps(calibrated)) {
+            const double share = gauss(random);
+            for (std::size_t i = 0; i < off.size(); ++i)
+                off[i] += share * step[i];
+        }
+        CameraEstimate found = calibrated;
+        found.camera = stepped(view, off);
+        SceneSolver solver(graph, found.camera);
+        (void)solver.solve();
+        with.count(solver.estimate(errorCameras(found)), truth);
+        without.count(solver.estimate(), truth);
+    }
+    // All numbers of a draw follow the few directions in which the camera's errors are large.
+    with.expectNormal(4.0 * kDraws);
+    EXPECT_LT(without.within1, without.numbers / 2);
 }
 
 }  // namespace
