@@ -1,7 +1,10 @@
 // foreground_truth ROOM_JSON FOLDER [SIZE SAMPLES]: a box is put before the object of a simulated
 // room, which is rendered and photographed with and without the object. Inserts the object with the
 // box unknown, as a solid box of the project, and as an outline of the photograph, and compares.
+// The pictures go into FOLDER, the capture and what each way makes of it (box-unknown.png …).
+// "Inside" is where the box stands before everything; the object's shadow may fall on it.
 
+#include "core/io/image_io.h"
 #include "pipeline/insert.h"
 #include "pipeline/simulate.h"
 
@@ -63,22 +66,25 @@ struct Judge {
     const Image<float>& object;    ///< where it is seen or would be
     const Image<float>& occluder;  ///< exact coverage
     Image<float> near;             ///< edge of the occluder
+    std::filesystem::path folder;
 
-    void report(const std::string& name, const InsertResult& result) const
+    void report(const std::string& name, const EncodedImage& picture) const
     {
+        std::string file = name + ".png";
+        std::replace(file.begin(), file.end(), ' ', '-');
+        writeEncoded(folder / file, picture);
         double inside = 0.0, edge = 0.0, shown = 0.0;
         int inside_count = 0, edge_count = 0, shown_count = 0, touched = 0;
         for (std::size_t i = 0; i < truth.codes.pixelCount(); ++i) {
-            const glm::dvec3 off = glm::dvec3(result.composite.image.codes.pixels()[i]) -
-                                   glm::dvec3(truth.codes.pixels()[i]);
+            const glm::dvec3 off =
+                glm::dvec3(picture.codes.pixels()[i]) - glm::dvec3(truth.codes.pixels()[i]);
             const double square = glm::dot(off, off) / 3.0;
             const float m = occluder.pixels()[i];
             const bool sure = m >= 1.0f && near.pixels()[i] <= 0.0f;
             if (sure) {
                 inside += square;
                 ++inside_count;
-                touched +=
-                    result.composite.image.codes.pixels()[i] != plate.codes.pixels()[i] ? 1 : 0;
+                touched += picture.codes.pixels()[i] != plate.codes.pixels()[i] ? 1 : 0;
             } else if (near.pixels()[i] > 0.0f) {
                 edge += square;
                 ++edge_count;
@@ -132,14 +138,15 @@ void run(const std::filesystem::path& room_file,
     for (float& value : near.pixels())
         value = value > 1e-3f && value < 1.0f - 1e-3f ? 1.0f : 0.0f;
     const Judge judge{
-        capture.plate.image, capture.with.image, capture.truth.coverage, occluder, near};
+        capture.plate.image, capture.with.image, capture.truth.coverage, occluder, near, folder};
 
     InsertOptions options;
     options.render.max_samples = 24;
     options.render.min_samples = 8;
     options.render.interreflection.samples_per_cell = 64;
-    judge.report("box unknown", insertObjects(without, options, silent));
-    judge.report("solid box of the room", insertObjects(with_box, options, silent));
+    judge.report("nothing inserted", capture.plate.image);
+    judge.report("box unknown", insertObjects(without, options, silent).composite.image);
+    judge.report("solid box of the room", insertObjects(with_box, options, silent).composite.image);
     const auto withMark = [&](double off, int refine) {
         Project project = with_box;
         ForegroundMark mark;
@@ -148,9 +155,12 @@ void run(const std::filesystem::path& room_file,
         project.foreground = {{mark, {}}};
         return project;
     };
-    judge.report("outline, exact", insertObjects(withMark(0.0, 0), options, silent));
-    judge.report("outline, corners 2 px off", insertObjects(withMark(2.0, 0), options, silent));
-    judge.report("outline, 2 px off, refined", insertObjects(withMark(2.0, 6), options, silent));
+    judge.report("outline, exact",
+                 insertObjects(withMark(0.0, 0), options, silent).composite.image);
+    judge.report("outline, corners 2 px off",
+                 insertObjects(withMark(2.0, 0), options, silent).composite.image);
+    judge.report("outline, 2 px off, refined",
+                 insertObjects(withMark(2.0, 6), options, silent).composite.image);
 }
 
 }  // namespace
