@@ -1,12 +1,14 @@
 // How well the strength of a sun that is clipped in every exposure is recovered.
 //
-//   clipped_truth [--leave-out N] ROOM_FOLDER...
+//   clipped_truth [--leave-out N] [--card] ROOM_FOLDER...
 //
 // A room is a folder with project.json, pano_linear.exr and truth.json, whose "sun" tells direction
 // and irradiance. The N shortest exposures of the probe are left out (5 in truth-room-c clip the
 // sun); 0 shows what the whole bracket gives. Irradiances are those of a surface that faces the
 // sun, over a cone of 4 degrees around it, each channel in the unit of the truth (one scale, the
-// median ratio of the panorama's texels).
+// median ratio of the panorama's texels). With --card also as solved by a grey card at the probe's
+// place: what the panorama says a surface there gets, facing the sun, or up, with no error of its
+// own.
 #include "core/check.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
@@ -84,7 +86,7 @@ glm::dvec3 unitScale(const EnvironmentMap& measured, const EnvironmentMap& truth
     return scale;
 }
 
-void judge(const std::filesystem::path& folder, int leave_out)
+void judge(const std::filesystem::path& folder, int leave_out, bool with_card)
 {
     const Sun sun = readSun(folder);
     Project project = readProject(folder / "project.json");
@@ -126,6 +128,23 @@ void judge(const std::filesystem::path& folder, int leave_out)
     print("panorama, truth", coneIrradiance(sun.direction, panorama));
     print("probe as merged", scale * coneIrradiance(sun.direction, probe));
     print("room light, fitted", scale * coneIrradiance(sun.direction, fitted));
+    if (!with_card) return;
+    for (const glm::dvec3& normal : {sun.direction, glm::dvec3(0.0, 1.0, 0.0)}) {
+        RoomLightOptions by_card = options.light;
+        by_card.references = {
+            {.name = "the grey card",
+             .places = {{light.center_m, normal, irradiance(truth, normal) / scale, 0.03}}}};
+        const RoomLight solved(
+            proxy, light.environment, light.center_m, std::nullopt, by_card, silent);
+        for (const Finding& finding : solved.findings())
+            if (finding.code.starts_with("light-clipped") ||
+                finding.code.starts_with("light-reference"))
+                fmt::print("  {}\n", finding.message);
+        print(normal.y < 1.0 ? "card that faces the sun" : "card that faces up",
+              scale * coneIrradiance(sun.direction, [&](glm::dvec3 d) {
+                  return solved.incident(light.center_m, d).radiance;
+              }));
+    }
 }
 
 }  // namespace
@@ -134,15 +153,17 @@ int main(int argc, char** argv)
 {
     CLI::App app("Strength of a clipped sun against its truth");
     int leave_out = 5;
+    bool with_card = false;
     std::vector<std::filesystem::path> rooms;
     app.add_option("--leave-out", leave_out, "Shortest exposures to leave out")
         ->capture_default_str();
+    app.add_flag("--card", with_card, "Also by a grey card");
     app.add_option("rooms", rooms, "Folders of truth rooms")->required();
     CLI11_PARSE(app, argc, argv);
     try {
         for (const auto& room : rooms) {
             fmt::print("{}, {} shortest exposures left out\n", room.filename().string(), leave_out);
-            judge(room, leave_out);
+            judge(room, leave_out, with_card);
         }
     } catch (const std::exception& error) {
         std::cerr << error.what() << "\n";

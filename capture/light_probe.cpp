@@ -58,24 +58,15 @@ LightProbe unwrapMirrorBall(const Image<Rgb>& radiance,
     const auto places = [&](glm::dvec3 direction) {
         return picture.places(direction, 2.0 * pi / width);
     };
-    if (options.clipped == nullptr) {
-        probe.environment.pixels = detail::averageOverTexels(
-            width, places, [&](glm::dvec3 d) { return picture.seen(d).radiance; });
-    } else {
-        const Image<std::uint8_t>& clipped = *options.clipped;
+    probe.environment.pixels = detail::averageOverTexels(
+        width, places, [&](glm::dvec3 d) { return picture.seen(d).radiance; });
+    if (options.clipped != nullptr) {
+        const Image<Rgb>& clipped = *options.clipped;
         INSITU_CHECK(clipped.sameSize(radiance), "{}x{}", clipped.width(), clipped.height());
-        const auto seen = detail::averageOverTexels(width, places, [&](glm::dvec3 d) {
-            const detail::BallPicture::Sample sample = picture.seen(d);
-            const int x = std::clamp(static_cast<int>(sample.pixel.x), 0, clipped.width() - 1);
-            const int y = std::clamp(static_cast<int>(sample.pixel.y), 0, clipped.height() - 1);
-            return glm::vec4(sample.radiance, clipped(x, y) != 0 ? 1.0f : 0.0f);
-        });
-        probe.environment.pixels = Image<Rgb>(seen.width(), seen.height());
-        probe.environment.clipped = Image<float>(seen.width(), seen.height());
-        for (std::size_t i = 0; i < seen.pixelCount(); ++i) {
-            probe.environment.pixels.pixels()[i] = Rgb(seen.pixels()[i]);
-            probe.environment.clipped.pixels()[i] = seen.pixels()[i].w;
-        }
+        Findings reported;  // as of the whole radiance
+        const detail::BallPicture part(clipped, ball, camera, options, reported);
+        probe.environment.clipped = detail::averageOverTexels(
+            width, places, [&](glm::dvec3 d) { return part.seen(d).radiance; });
     }
     detail::reportCoverage(picture, probe.findings);
     return probe;

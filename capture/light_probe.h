@@ -40,9 +40,9 @@ struct UnwrapOptions {
     /// reflected rays, which start on the ball and not at its centre, are put where they belong.
     /// Called from several threads; infinity where nothing is near. Absent: everything is far away.
     std::function<double(glm::dvec3 origin, glm::dvec3 direction)> distance_to_room;
-    /// Pixels of the picture whose radiance is only a lower bound (not 0), of its size: then
-    /// EnvironmentMap::clipped says how much of each texel they are. Absent: none.
-    const Image<std::uint8_t>* clipped = nullptr;
+    /// The part of the picture's radiance that is only a lower bound, of its size; it becomes
+    /// EnvironmentMap::clipped. Absent: none.
+    const Image<Rgb>* clipped = nullptr;
 };
 
 struct LightProbe {

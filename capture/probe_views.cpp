@@ -37,14 +37,17 @@ void checkView(const ProbeView& view, const ProbeView& first)
 {
     detail::checkRadiance(view.radiance);
     detail::checkBall(view.ball, view.camera.position_m);
-    for (const ProbeMask* mask : {&view.mask, &view.clipped})
-        if (!mask->empty() && !mask->sameSize(view.radiance))
-            throw InputError("probe mask",
-                             fmt::format("{}x{} pixels for a picture of {}x{}",
-                                         mask->width(),
-                                         mask->height(),
-                                         view.radiance.width(),
-                                         view.radiance.height()));
+    if (!view.mask.empty() && !view.mask.sameSize(view.radiance))
+        throw InputError("probe mask",
+                         fmt::format("{}x{} pixels for a picture of {}x{}",
+                                     view.mask.width(),
+                                     view.mask.height(),
+                                     view.radiance.width(),
+                                     view.radiance.height()));
+    INSITU_CHECK(view.clipped.empty() || view.clipped.sameSize(view.radiance),
+                 "{}x{}",
+                 view.clipped.width(),
+                 view.clipped.height());
     if (glm::length(view.ball.center_m - first.ball.center_m) > kSamePlace * first.ball.radius_m)
         throw InputError("light probe",
                          "the views show balls at different places: one environment is what is "
@@ -75,7 +78,7 @@ struct ViewMap {
     Image<float> weight;     ///< 0: not seen
     Image<Rgb> rim;          ///< the rim's radiance where the view is blind and not masked
     Image<float> rim_share;  ///< of the texel, 0 to 1
-    Image<float> clipped;    ///< share of what was used, seen or rim, that is a lower bound
+    Image<Rgb> clipped;      ///< part of what is used, `radiance` or `rim`
 };
 
 /// Sums over one texel's places.
@@ -84,23 +87,22 @@ struct TexelSums {
     double weight = 0.0;
     glm::dvec3 rim{0.0};
     int rim_count = 0;
-    double clipped = 0.0;      ///< of `weight`
-    double rim_clipped = 0.0;  ///< of `rim_count`
+    glm::dvec3 clipped{0.0};      ///< of `radiance`
+    glm::dvec3 rim_clipped{0.0};  ///< of `rim`
 };
 
 TexelSums sumTexel(const BallPicture& picture,
                    const Image<float>& free,
-                   const ProbeMask& clipped,
+                   const ProbeView& view,
                    glm::ivec2 texel,
                    int width,
                    int n)
 {
     TexelSums sums;
-    const auto isClipped = [&](glm::dvec2 pixel) {
-        if (clipped.empty()) return false;
-        const int x = std::clamp(static_cast<int>(pixel.x), 0, clipped.width() - 1);
-        const int y = std::clamp(static_cast<int>(pixel.y), 0, clipped.height() - 1);
-        return clipped(x, y) != 0;
+    const auto clippedAt = [&](glm::dvec2 pixel) {
+        return view.clipped.empty() ? glm::dvec3(0.0)
+                                    : glm::dvec3(sampleBilinear(view.clipped, pixel.x, pixel.y)) /
+                                          view.ball.reflectance;
     };
     detail::forEachPlace(width, texel, n, [&](glm::dvec3 direction) {
         const BallPicture::Sample sample = picture.seen(direction);
@@ -110,14 +112,14 @@ TexelSums sumTexel(const BallPicture& picture,
         if (sample.blind) {
             sums.rim += glm::dvec3(sample.radiance);
             ++sums.rim_count;
-            if (isClipped(sample.pixel)) sums.rim_clipped += 1.0;
+            sums.rim_clipped += clippedAt(sample.pixel);
             return;
         }
         const double resolution = picture.resolution(direction);
         const double weight = open * resolution * resolution;
         sums.radiance += weight * glm::dvec3(sample.radiance);
         sums.weight += weight;
-        if (isClipped(sample.pixel)) sums.clipped += weight;
+        sums.clipped += weight * clippedAt(sample.pixel);
     });
     return sums;
 }
@@ -137,12 +139,12 @@ ViewMap unwrapView(const ProbeView& view,
                 Image<float>(width, height),
                 Image<Rgb>(width, height),
                 Image<float>(width, height),
-                Image<float>(width, height)};
+                Image<Rgb>(width, height)};
     parallelFor(0, height, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
         for (int x = 0; x < width; ++x) {
             const int n = picture.places(detail::middleOfTexel(width, {x, y}), 2.0 * pi / width);
-            const TexelSums sums = sumTexel(picture, free, view.clipped, {x, y}, width, n);
+            const TexelSums sums = sumTexel(picture, free, view, {x, y}, width, n);
             if (sums.weight > 0.0) {
                 map.radiance(x, y) = Rgb(sums.radiance / sums.weight);
                 map.weight(x, y) = static_cast<float>(sums.weight / (n * n));
@@ -151,10 +153,9 @@ ViewMap unwrapView(const ProbeView& view,
                 map.rim(x, y) = Rgb(sums.rim / static_cast<double>(sums.rim_count));
                 map.rim_share(x, y) =
                     static_cast<float>(sums.rim_count) / static_cast<float>(n * n);
-                map.clipped(x, y) = static_cast<float>(sums.rim_clipped / sums.rim_count);
+                map.clipped(x, y) = Rgb(sums.rim_clipped / static_cast<double>(sums.rim_count));
             }
-            if (sums.weight > 0.0)
-                map.clipped(x, y) = static_cast<float>(sums.clipped / sums.weight);
+            if (sums.weight > 0.0) map.clipped(x, y) = Rgb(sums.clipped / sums.weight);
         }
     });
     return map;
@@ -240,8 +241,8 @@ void blend(const std::vector<ViewMap>& maps,
             glm::dvec3 rim(0.0);
             double weight = 0.0;
             double rim_weight = 0.0;
-            double clipped = 0.0;
-            double rim_clipped = 0.0;
+            glm::dvec3 clipped(0.0);
+            glm::dvec3 rim_clipped(0.0);
             for (std::size_t i = 0; i < maps.size(); ++i) {
                 const double w = maps[i].weight(x, y);
                 const double r = maps[i].rim_share(x, y);
@@ -249,14 +250,13 @@ void blend(const std::vector<ViewMap>& maps,
                 rim += r * scales[i] * glm::dvec3(maps[i].rim(x, y));
                 weight += w;
                 rim_weight += r;
-                clipped += w * maps[i].clipped(x, y);
-                rim_clipped += r * maps[i].clipped(x, y);
+                clipped += w * scales[i] * glm::dvec3(maps[i].clipped(x, y));
+                rim_clipped += r * scales[i] * glm::dvec3(maps[i].clipped(x, y));
             }
             if (!probe.environment.clipped.empty())
-                probe.environment.clipped(x, y) =
-                    static_cast<float>(weight > 0.0       ? clipped / weight
-                                       : rim_weight > 0.0 ? rim_clipped / rim_weight
-                                                          : 0.0);
+                probe.environment.clipped(x, y) = weight > 0.0       ? Rgb(clipped / weight)
+                                                  : rim_weight > 0.0 ? Rgb(rim_clipped / rim_weight)
+                                                                     : Rgb(0.0f);
             if (weight > 0.0) {
                 map(x, y) = Rgb(seen / weight);
             } else if (rim_weight > 0.0) {
@@ -301,7 +301,7 @@ MergedProbe mergeProbeViews(const std::vector<ProbeView>& views, const MergeView
     }
     merged.probe.environment.pixels = Image<Rgb>(width, width / 2);
     if (std::ranges::any_of(views, [](const ProbeView& view) { return !view.clipped.empty(); }))
-        merged.probe.environment.clipped = Image<float>(width, width / 2);
+        merged.probe.environment.clipped = Image<Rgb>(width, width / 2);
     ProbeMask holes(width, width / 2);
     blend(maps, scales, merged.probe, holes);
     inpaintProbe(merged.probe, holes);

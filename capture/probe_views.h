@@ -19,9 +19,8 @@ struct ProbeView {
     /// Of the same size as `radiance`, or empty: non-zero on the photographer, the tripod, a
     /// scratch.
     ProbeMask mask;
-    /// Likewise: non-zero where the radiance is only a lower bound. The merged environment then
-    /// says how much of each texel is (EnvironmentMap::clipped).
-    ProbeMask clipped = {};
+    /// As UnwrapOptions::clipped, or empty.
+    Image<Rgb> clipped = {};
 };
 
 struct MergeViewsOptions {

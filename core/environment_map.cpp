@@ -37,9 +37,10 @@ double environmentTexelSolidAngle(int width, int height, int y)
     return 2.0 * pi / width * (top - bottom);
 }
 
-Rgb lookUp(const EnvironmentMap& environment, glm::dvec3 unit_direction)
+namespace {
+
+Rgb bilinear(const Image<Rgb>& image, glm::dvec3 unit_direction)
 {
-    const Image<Rgb>& image = environment.pixels;
     const glm::dvec2 uv = environmentUvFromDirection(unit_direction);
     const double x = uv.x * image.width() - 0.5;
     const double y = std::clamp(uv.y * image.height() - 0.5, 0.0, image.height() - 1.0);
@@ -52,6 +53,18 @@ Rgb lookUp(const EnvironmentMap& environment, glm::dvec3 unit_direction)
     const float ty = static_cast<float>(y - y0);
     return (image(x0, y0) * (1.0f - tx) + image(x1, y0) * tx) * (1.0f - ty) +
            (image(x0, y1) * (1.0f - tx) + image(x1, y1) * tx) * ty;
+}
+
+}  // namespace
+
+Rgb lookUp(const EnvironmentMap& environment, glm::dvec3 unit_direction)
+{
+    return bilinear(environment.pixels, unit_direction);
+}
+
+Rgb lookUpClipped(const EnvironmentMap& environment, glm::dvec3 unit_direction)
+{
+    return environment.clipped.empty() ? Rgb(0.0f) : bilinear(environment.clipped, unit_direction);
 }
 
 glm::dvec3 irradiance(const EnvironmentMap& environment, glm::dvec3 unit_normal)

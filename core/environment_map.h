@@ -13,9 +13,9 @@ namespace insitu {
 /// Directions are in the world frame.
 struct EnvironmentMap {
     Image<Rgb> pixels;
-    /// Share of each texel, [0, 1], whose radiance is only a lower bound: clipped in every
-    /// exposure. Empty: of none.
-    Image<float> clipped{};
+    /// The part of each texel's radiance that comes from what is clipped in every exposure, and is
+    /// therefore only a lower bound; 0 to `pixels`, in each channel. Empty: none.
+    Image<Rgb> clipped{};
 };
 
 [[nodiscard]] glm::dvec2 environmentUvFromDirection(glm::dvec3 unit_direction);
@@ -26,6 +26,8 @@ struct EnvironmentMap {
 [[nodiscard]] glm::ivec2 environmentTexelAt(int width, int height, glm::dvec3 unit_direction);
 /// Bilinear look-up, wrapping in azimuth, clamped at the poles.
 [[nodiscard]] Rgb lookUp(const EnvironmentMap& environment, glm::dvec3 unit_direction);
+/// The same of its clipped part, so that the difference of both is what was measured.
+[[nodiscard]] Rgb lookUpClipped(const EnvironmentMap& environment, glm::dvec3 unit_direction);
 /// Irradiance of a surface with the given unit normal: Σ L cos ΔΩ over the upper hemisphere.
 [[nodiscard]] glm::dvec3 irradiance(const EnvironmentMap& environment, glm::dvec3 unit_normal);
 

@@ -116,10 +116,7 @@ double patchSize(const SceneProxy& proxy, double wanted)
 /// A lower bound is all that the probe knows of this direction.
 bool isClipped(const EnvironmentMap& probe, glm::dvec3 direction)
 {
-    if (probe.clipped.empty()) return false;
-    const glm::ivec2 texel =
-        environmentTexelAt(probe.clipped.width(), probe.clipped.height(), direction);
-    return probe.clipped(texel.x, texel.y) > 0.0f;
+    return lookUpClipped(probe, direction) != Rgb(0.0f);
 }
 
 /// Probe radiance projected outwards: each direction's goes to the patch that it meets.

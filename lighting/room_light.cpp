@@ -73,7 +73,7 @@ RoomLight::RoomLight(const SceneProxy& proxy,
       probe_saw_(radiance_.size(), 0),
       photo_saw_(radiance_.size(), 0),
       gap_(radiance_.size(), 0),
-      clipped_(radiance_.size(), 0),
+      clipped_(radiance_),
       cell_irradiance_(proxy,
                        std::max(options.cell_m, std::sqrt(totalArea(proxy) / (kMaxTexels / 64.0)))),
       cell_reflectance_(cell_irradiance_)
@@ -125,7 +125,7 @@ void RoomLight::buildTables(glm::dvec3 reference)
         }
     }
     if (surface_power > 0.0) {
-        liftClipped(weights, [&](std::size_t i) { return clipped_[i] != 0; });
+        liftClipped(weights, [&](std::size_t i) { return clipped_[i] != Rgb(0.0f); });
         texel_table_.emplace(weights);
     }
 
@@ -143,7 +143,9 @@ void RoomLight::buildTables(glm::dvec3 reference)
         }
     }
     if (far_power > 0.0) {
-        liftClipped(far_weights, [&](std::size_t i) { return outside_band_[i] == kClippedBand; });
+        if (!outside_.clipped.empty())
+            liftClipped(far_weights,
+                        [&](std::size_t i) { return outside_.clipped.pixels()[i] != Rgb(0.0f); });
         outside_table_.emplace(far_weights);
     }
 
@@ -223,12 +225,14 @@ RoomLight::Arrival RoomLight::arrive(glm::dvec3 x, glm::dvec3 direction) const
     if (hit && !hit->opening) {
         const double cosine = std::abs(glm::dot(hit->normal, direction));
         arrival.light.radiance = faceRadiance(hit->face, hit->uv);
+        arrival.clipped = clipped_.lookUp(hit->face, hit->uv, Rgb(0.0f));
         arrival.light.distance_m = hit->distance_m;
         arrival.light.pdf = texelPdf(hit->face, hit->uv) * hit->distance_m * hit->distance_m /
                             std::max(cosine, 1e-9);
         return arrival;
     }
     arrival.light.radiance = lookUp(outside_, direction);
+    arrival.clipped = lookUpClipped(outside_, direction);
     arrival.light.pdf = outsidePdf(direction);
     if (hit) {
         const double cosine = std::abs(glm::dot(hit->normal, direction));

@@ -7,6 +7,7 @@
 #include "lighting/alias_table.h"
 #include "lighting/face_grid.h"
 #include "lighting/light_fit.h"
+#include "lighting/light_reference.h"
 #include "lighting/light_source.h"
 #include "reconstruct/scene_proxy.h"
 
@@ -30,6 +31,9 @@ struct RoomLightOptions {
     bool fit_unmeasured = true;
     /// Where the objects stand: light is drawn by what it does there.
     glm::dvec3 reference_point_m{0.0};
+    /// What was measured of the light: with fit_unmeasured it solves for lights that are clipped,
+    /// before what the surfaces say.
+    std::vector<ReferenceGroup> references;
     std::uint64_t seed = 1;
 
     [[nodiscard]] Findings validate() const;
@@ -50,7 +54,9 @@ struct PhotographedRadiance {
 /// opening that the probe did not see through takes the nearest one that it did, scaled so that the
 /// light on each surface explains its measured radiance (light_fit.h). Rays that miss the proxy
 /// see the probe's environment at infinity. Lights that are clipped in every exposure are scaled in
-/// the same way, when a patch of their light tells how strong they are.
+/// the same way, when a patch of their light tells how strong they are, or by references
+/// (light_reference.h), which count far more: what a patch says has errors in common, of the
+/// sky that the probe did not see and of surfaces that are not Lambert's.
 ///
 /// A solid box stands for furniture that may have gaps: where the probe, looking at its face
 /// towards an opening, saw more light than any surface there could reflect, it saw the opening
@@ -59,7 +65,7 @@ struct PhotographedRadiance {
 /// Findings: "light-unseen-surfaces" (share of the area), "light-opening-extended" (share of the
 /// light through openings that is taken from the nearest seen direction), "light-opening-unseen",
 /// "light-opening-fitted" (the scale), "light-through-gaps", "light-clipped-solved" (the strength),
-/// "light-clipped-unsolved" (the bound).
+/// "light-clipped-unsolved" (the bound), and of references those of light_reference.h.
 class RoomLight : public LightSource {
 public:
     RoomLight(const SceneProxy& proxy,
@@ -77,6 +83,7 @@ public:
     /// The same as incident(), with what was hit (nothing: far away).
     struct Arrival {
         IncidentLight light;
+        Rgb clipped{0.0f};  ///< part of the radiance that comes from lights clipped in the probe
         std::optional<ProxyHit> hit;
     };
     [[nodiscard]] Arrival arrive(glm::dvec3 x, glm::dvec3 direction) const;
@@ -127,6 +134,13 @@ private:
     [[nodiscard]] std::vector<LitCell> litCells() const;
     [[nodiscard]] bool scaleOpenings(const LightFit& fit, std::span<const LitCell> cells);
     [[nodiscard]] bool scaleClipped(const LightFit& fit, std::span<const LitCell> cells);
+    void scaleClippedBy(glm::dvec3 factor);
+    /// Irradiance at the references' places, openings as `fit` scales them.
+    [[nodiscard]] std::vector<PredictedIrradiance> predictReferences(
+        const RoomLightOptions& options, const LightFit& fit, bool openings) const;
+    [[nodiscard]] bool solveByReferences(const RoomLightOptions& options,
+                                         const LightFit& fit,
+                                         bool openings);
     void scaleDoubtfulIrradiance();
     void fillUnseen();
     void reportCoverage(glm::dvec3 reference);
@@ -142,32 +156,47 @@ private:
         glm::dvec3 higher{0.0};
     };
     using BandIrradiance = std::array<glm::dvec3, kLightBands>;
-    [[nodiscard]] glm::dvec3 cellIrradianceAt(glm::dvec3 x,
-                                              glm::dvec3 normal,
-                                              std::uint64_t cell,
-                                              const RoomLightOptions& options,
-                                              BandIrradiance* bands,
-                                              Doubt* doubt) const;
+    /// Mean over the places, of one normal; `cell` numbers the random stream.
+    [[nodiscard]] glm::dvec3 irradianceOver(std::span<const glm::dvec3> places,
+                                            glm::dvec3 normal,
+                                            std::uint64_t cell,
+                                            const RoomLightOptions& options,
+                                            BandIrradiance* bands,
+                                            Doubt* doubt) const;
+    void listClipped();
+    /// An estimate from one clipped texel, drawn by its power.
+    [[nodiscard]] glm::dvec3 clippedIrradianceAt(glm::dvec3 x,
+                                                 glm::dvec3 normal,
+                                                 double selector,
+                                                 glm::vec2 u) const;
 
     const SceneProxy& proxy_;
     FaceGrid<Rgb> radiance_;               ///< every texel outside openings is valid when built
     std::vector<std::uint8_t> probe_saw_;  ///< per texel of radiance_
     std::vector<std::uint8_t> photo_saw_;
-    std::vector<std::uint8_t> gap_;      ///< per texel of radiance_: light passes
-    std::vector<std::uint8_t> clipped_;  ///< per texel of radiance_: a lower bound
+    std::vector<std::uint8_t> gap_;  ///< per texel of radiance_: light passes
+    FaceGrid<Rgb> clipped_;          ///< part of radiance_ that is only a lower bound
     FaceGrid<Rgb> cell_irradiance_;
     FaceGrid<Rgb> cell_reflectance_;
-    EnvironmentMap outside_;  ///< what lies beyond the openings, or everywhere
+    EnvironmentMap outside_;  ///< what lies beyond the openings, or everywhere; clipped: as seen
     std::vector<std::uint8_t> outside_seen_;
-    /// The LightBand of a far direction; kMeasured: none.
+    /// The LightBand of a far direction that the probe did not see; kMeasured: it did.
     static constexpr std::uint8_t kMeasured = 255;
     std::vector<std::uint8_t> outside_band_;
     std::vector<BandIrradiance> cell_bands_;  ///< part of cell_irradiance_ of each band
     std::vector<Rgb> cell_radiance_;
-    std::vector<std::uint8_t> cell_shines_;  ///< holds clipped texels: a lamp, not a lit surface
+    std::vector<std::uint8_t> cell_shines_;  ///< holds clipped light: a lamp, not a lit surface
     std::vector<Doubt> cell_doubt_;
     FaceGrid<Rgb> irradiance_scale_;
     Image<std::uint8_t> see_through_;  ///< per pixel of the photograph
+
+    /// A texel of clipped_ or, far away, of outside_.clipped.
+    struct ClippedSource {
+        std::size_t texel = 0;
+        bool far = false;
+        double cumulative = 0.0;  ///< of the power of all up to this one
+    };
+    std::vector<ClippedSource> clipped_sources_;
 
     /// The three ways to draw light: a texel by its power, a point in an opening, a far direction.
     std::optional<AliasTable> texel_table_;

@@ -27,15 +27,6 @@ std::uint8_t bandOf(glm::vec3 direction, glm::vec3 nearest)
     return higher > 0.0f ? kAboveBand : kBelowBand;
 }
 
-/// Share of a direction's texel that is clipped in every exposure.
-float clippedShare(const EnvironmentMap& probe, glm::dvec3 direction)
-{
-    if (probe.clipped.empty()) return 0.0f;
-    const glm::ivec2 texel =
-        environmentTexelAt(probe.clipped.width(), probe.clipped.height(), direction);
-    return probe.clipped(texel.x, texel.y);
-}
-
 }  // namespace
 
 void RoomLight::findGaps(const EnvironmentMap& probe, glm::dvec3 center)
@@ -83,7 +74,7 @@ void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progre
                 Rgb sum(0.0f);
                 int seen = 0;
                 int solid = 0;
-                float bound = 0.0f;
+                Rgb clipped(0.0f);
                 for (int k = 0; k < kBakeGrid * kBakeGrid; ++k) {
                     const glm::dvec2 inside((k % kBakeGrid + 0.5) / kBakeGrid,
                                             (k / kBakeGrid + 0.5) / kBakeGrid);
@@ -97,14 +88,15 @@ void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progre
                                         glm::dot(way, proxy_.faces()[face].normal) < 0.0;
                     if (!facing || !proxy_.mutuallyVisible(center, point)) continue;
                     sum += lookUp(probe, glm::normalize(way));
-                    bound += clippedShare(probe, glm::normalize(way));
+                    clipped += lookUpClipped(probe, glm::normalize(way));
                     ++seen;
                 }
                 radiance_.setValid(index, solid > 0);
+                clipped_.setValid(index, solid > 0);
                 if (seen == 0) continue;
                 radiance_[index] = sum / static_cast<float>(seen);
                 probe_saw_[index] = 1;
-                clipped_[index] = bound > 0.5f * static_cast<float>(seen);
+                clipped_[index] = clipped / static_cast<float>(seen);
             }
         });
     }
@@ -156,8 +148,7 @@ void RoomLight::extendBeyondOpenings(const EnvironmentMap& probe, glm::dvec3 cen
                               leaves(x, row + 1) && leaves(x + 1, row + 1);
             const std::size_t i = static_cast<std::size_t>(y * width + x);
             outside_seen_[i] = seen;
-            if (seen && !probe.clipped.empty() && probe.clipped(x, static_cast<int>(y)) > 0.0f)
-                outside_band_[i] = kClippedBand;
+            if (!seen && !outside_.clipped.empty()) outside_.clipped.pixels()[i] = Rgb(0.0f);
         }
     });
 

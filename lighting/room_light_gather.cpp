@@ -1,7 +1,6 @@
 #include "core/color.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "lighting/light_fit.h"
 #include "lighting/room_light.h"
 #include "lighting/sampling.h"
 #include "lighting/see_through.h"
@@ -23,38 +22,97 @@ constexpr float kUnseenReflectance = 0.5f;
 /// Share of a cell's irradiance that may be in doubt before the cell says little of its face.
 constexpr double kLittleDoubt = 0.1;
 constexpr std::size_t kMinFaceCells = 20;
-/// Standard deviation of the logarithm of a clipped light's strength at which it is believed.
-constexpr double kBelievedLogSigma = 0.3;
+/// Sets the random numbers of clipped lights apart from those of the others.
+constexpr std::uint64_t kClippedStream = 0x9e3779b97f4a7c15;
 
 }  // namespace
 
-glm::dvec3 RoomLight::cellIrradianceAt(glm::dvec3 x,
-                                       glm::dvec3 normal,
-                                       std::uint64_t cell,
-                                       const RoomLightOptions& options,
-                                       BandIrradiance* bands,
-                                       Doubt* doubt) const
+void RoomLight::listClipped()
 {
-    // Cosine and light sampling joined by the balance heuristic [Veach97, 9.2].
+    clipped_sources_.clear();
+    double sum = 0.0;
+    const auto add = [&](std::size_t texel, bool far, Rgb light, double size) {
+        const double power = static_cast<double>(luminance(light)) * size;
+        if (!(power > 0.0)) return;
+        sum += power;
+        clipped_sources_.push_back({texel, far, sum});
+    };
+    for (std::size_t face = 0; face < clipped_.faceCount(); ++face)
+        for (const std::size_t i : clipped_.texelsOf(face))
+            if (clipped_.valid(i)) add(i, false, clipped_[i], texelArea(face));
+    const Image<Rgb>& far = outside_.clipped;
+    for (std::size_t i = 0; i < far.pixelCount(); ++i)
+        add(i,
+            true,
+            far.pixels()[i],
+            environmentTexelSolidAngle(
+                far.width(), far.height(), static_cast<int>(i) / far.width()));
+}
+
+glm::dvec3 RoomLight::clippedIrradianceAt(glm::dvec3 x,
+                                          glm::dvec3 normal,
+                                          double selector,
+                                          glm::vec2 u) const
+{
+    const double total = clipped_sources_.back().cumulative;
+    const auto chosen = std::ranges::lower_bound(clipped_sources_.begin(),
+                                                 clipped_sources_.end() - 1,
+                                                 selector * total,
+                                                 {},
+                                                 &ClippedSource::cumulative);
+    const double below = chosen == clipped_sources_.begin() ? 0.0 : (chosen - 1)->cumulative;
+    const double probability = (chosen->cumulative - below) / total;
+    if (chosen->far) {
+        const Image<Rgb>& far = outside_.clipped;
+        const glm::dvec3 direction = directionInTexel(far.width(), far.height(), chosen->texel, u);
+        const double cosine = glm::dot(direction, normal);
+        if (cosine <= 0.0) return glm::dvec3(0.0);
+        const auto hit = intersect(x, direction);
+        if (hit && !hit->opening) return glm::dvec3(0.0);
+        const int row = static_cast<int>(chosen->texel) / far.width();
+        const double size = environmentTexelSolidAngle(far.width(), far.height(), row);
+        return glm::dvec3(far.pixels()[chosen->texel]) * (cosine * size / probability);
+    }
+    const auto texel = clipped_.texel(chosen->texel);
+    const glm::dvec3 way = proxy_.pointOn(texel.face, clipped_.uv(texel, glm::dvec2(u))) - x;
+    const double distance = glm::length(way);
+    if (!(distance > 1e-9)) return glm::dvec3(0.0);
+    const glm::dvec3 direction = way / distance;
+    const double cosine = glm::dot(direction, normal);
+    if (cosine <= 0.0) return glm::dvec3(0.0);
+    const auto hit = intersect(x, direction);
+    if (!hit || hit->face != texel.face ||
+        std::abs(hit->distance_m - distance) > 1e-6 * (1.0 + distance))
+        return glm::dvec3(0.0);
+    const double there = std::abs(glm::dot(direction, hit->normal));
+    return glm::dvec3(clipped_[chosen->texel]) *
+           (cosine * there * texelArea(texel.face) / (distance * distance * probability));
+}
+
+glm::dvec3 RoomLight::irradianceOver(std::span<const glm::dvec3> places,
+                                     glm::dvec3 normal,
+                                     std::uint64_t cell,
+                                     const RoomLightOptions& options,
+                                     BandIrradiance* bands,
+                                     Doubt* doubt) const
+{
+    // What was measured or guessed: cosine and light sampling joined by the balance heuristic
+    // [Veach97, 9.2].
     glm::dvec3 sum(0.0);
     const glm::dmat3 frame = frameFromNormal(normal);
     const auto add = [&](glm::dvec3 direction, const Arrival& arrival) {
         const double cosine = glm::dot(direction, normal);
         if (cosine <= 0.0) return;
-        const glm::dvec3 part =
-            glm::dvec3(arrival.light.radiance) * (cosine / (cosine / pi + arrival.light.pdf));
-        sum += part;
-        const double share = 1.0 / options.rays_per_cell;
+        const double weight = cosine / (cosine / pi + arrival.light.pdf) / options.rays_per_cell;
+        const glm::dvec3 radiance =
+            glm::dvec3(arrival.light.radiance) - glm::dvec3(arrival.clipped);
+        sum += radiance * weight;
         if (!arrival.hit || arrival.hit->opening) {
             const std::uint8_t band = outsideBand(direction);
-            if (band != kMeasured) (*bands)[band] += part * share;
-        } else if (clipped_[radiance_.texelAt(arrival.hit->face, arrival.hit->uv)]) {
-            (*bands)[kClippedBand] += part * share;
-        } else if (proxy_.faces()[arrival.hit->face].solid) {
-            const double weight = cosine / (cosine / pi + arrival.light.pdf) * share;
+            if (band != kMeasured) (*bands)[band] += radiance * weight;
+        } else if (proxy_.faces()[arrival.hit->face].solid && arrival.clipped == Rgb(0.0f)) {
             const glm::dvec3 change =
-                weight * (glm::dvec3(radianceBehind(*arrival.hit, direction)) -
-                          glm::dvec3(arrival.light.radiance));
+                weight * (glm::dvec3(radianceBehind(*arrival.hit, direction)) - radiance);
             doubt->lower += glm::min(change, glm::dvec3(0.0));
             doubt->higher += glm::max(change, glm::dvec3(0.0));
         }
@@ -62,6 +120,7 @@ glm::dvec3 RoomLight::cellIrradianceAt(glm::dvec3 x,
     const int strata = static_cast<int>(std::sqrt(options.rays_per_cell));
     for (int s = 0; s < options.rays_per_cell; ++s) {
         RandomStream random(options.seed, cell, static_cast<std::uint64_t>(s));
+        const glm::dvec3 x = places[static_cast<std::size_t>(s) % places.size()];
         glm::vec2 u = random.uniform2();
         if (s < strata * strata)
             u = (u + glm::vec2(s % strata, s / strata)) / static_cast<float>(strata);
@@ -71,7 +130,20 @@ glm::dvec3 RoomLight::cellIrradianceAt(glm::dvec3 x,
         if (const auto drawn = draw(x, selector, random.uniform2()))
             add(drawn->direction, drawn->arrival);
     }
-    return sum / static_cast<double>(options.rays_per_cell);
+    // What is clipped by itself, systematically: it may become a thousand times as strong, and so
+    // would its noise.
+    const int count = clipped_sources_.empty() ? 0 : std::max(1, options.rays_per_cell / 2);
+    for (int s = 0; s < count; ++s) {
+        RandomStream random(options.seed ^ kClippedStream, cell, static_cast<std::uint64_t>(s));
+        // 5 is coprime to the number of places of a whole cell.
+        const glm::dvec3 x = places[static_cast<std::size_t>(s) * 5 % places.size()];
+        const double selector = (s + random.uniformDouble()) / count;
+        const glm::dvec3 part = clippedIrradianceAt(x, normal, selector, random.uniform2()) /
+                                static_cast<double>(count);
+        sum += part;
+        (*bands)[kClippedBand] += part;
+    }
+    return sum;
 }
 
 void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
@@ -81,143 +153,48 @@ void RoomLight::gatherCells(const RoomLightOptions& options, Progress& progress)
     cell_doubt_.resize(cell_irradiance_.size());
     cell_radiance_.resize(cell_irradiance_.size());
     cell_shines_.resize(cell_irradiance_.size());
+    listClipped();
     parallelFor(0, static_cast<std::int64_t>(cell_irradiance_.size()), [&](std::int64_t number) {
         const std::size_t cell = static_cast<std::size_t>(number);
         const auto texel = cell_irradiance_.texel(cell);
         const ProxyFace& face = proxy_.faces()[texel.face];
-        const glm::dvec2 center = cell_irradiance_.uv(texel, glm::dvec2(0.5));
-        const glm::dvec3 x = proxy_.pointOn(texel.face, center);
 
-        Rgb radiance(0.0f);
-        int count = 0;
-        cell_shines_[cell] = 0;
+        // Radiance and irradiance of the same places: of those that were seen, if any.
+        std::vector<glm::dvec2> seen;
+        std::vector<glm::dvec2> unseen;
         for (int k = 0; k < kGrid * kGrid; ++k) {
             const glm::dvec2 uv =
                 cell_irradiance_.uv(texel, {(k % kGrid + 0.5) / kGrid, (k / kGrid + 0.5) / kGrid});
-            if (!radiance_.valid(radiance_.texelAt(texel.face, uv))) continue;
-            radiance += faceRadiance(texel.face, uv);
-            ++count;
-            if (clipped_[radiance_.texelAt(texel.face, uv)]) cell_shines_[cell] = 1;
+            const std::size_t at = radiance_.texelAt(texel.face, uv);
+            if (radiance_.valid(at))
+                (probe_saw_[at] || photo_saw_[at] ? seen : unseen).push_back(uv);
         }
-        cell_irradiance_.setValid(cell, count > 0);
-        cell_reflectance_.setValid(cell, count > 0);
+        const std::vector<glm::dvec2>& used = seen.empty() ? unseen : seen;
+        cell_irradiance_.setValid(cell, !used.empty());
+        cell_reflectance_.setValid(cell, !used.empty());
         cell_bands_[cell] = {};
         cell_doubt_[cell] = {};
-        if (count == 0) return;
-        cell_radiance_[cell] = radiance / static_cast<float>(count);
-        const Rgb irradiance(cellIrradianceAt(
-            x, face.normal, cell, options, &cell_bands_[cell], &cell_doubt_[cell]));
+        cell_shines_[cell] = 0;
+        if (used.empty()) return;
+        Rgb radiance(0.0f);
+        std::vector<glm::dvec3> places;
+        for (const glm::dvec2& uv : used) {
+            radiance += faceRadiance(texel.face, uv) / static_cast<float>(used.size());
+            places.push_back(proxy_.pointOn(texel.face, uv));
+            if (clipped_.lookUp(texel.face, uv, Rgb(0.0f)) != Rgb(0.0f)) cell_shines_[cell] = 1;
+        }
+        cell_radiance_[cell] = radiance;
+        const Rgb irradiance(irradianceOver(
+            places, face.normal, cell, options, &cell_bands_[cell], &cell_doubt_[cell]));
         cell_irradiance_[cell] = irradiance;
         for (int c = 0; c < 3; ++c)
             cell_reflectance_[cell][c] =
-                irradiance[c] > 0.0f ? std::min(static_cast<float>(pi) * radiance[c] /
-                                                    (static_cast<float>(count) * irradiance[c]),
-                                                kMaxReflectance)
-                                     : kUnseenReflectance;
+                irradiance[c] > 0.0f
+                    ? std::min(static_cast<float>(pi) * radiance[c] / irradiance[c],
+                               kMaxReflectance)
+                    : kUnseenReflectance;
     });
     progress.checkpoint();
-}
-
-std::vector<LitCell> RoomLight::litCells() const
-{
-    std::vector<LitCell> cells;
-    for (std::size_t i = 0; i < cell_irradiance_.size(); ++i) {
-        if (!cell_irradiance_.valid(i)) continue;
-        const auto texel = cell_irradiance_.texel(i);
-        const std::size_t here = radiance_.texelAt(texel.face, cell_irradiance_.centerUv(i));
-        if ((!probe_saw_[here] && !photo_saw_[here]) || cell_shines_[i]) continue;
-        LitCell cell;
-        cell.face = texel.face;
-        cell.area =
-            proxy_.area(texel.face) / (static_cast<double>(cell_irradiance_.columns(texel.face)) *
-                                       cell_irradiance_.rows(texel.face));
-        cell.radiance = glm::dvec3(cell_radiance_[i]);
-        cell.guessed = cell_bands_[i];
-        cell.known = glm::dvec3(cell_irradiance_[i]);
-        for (const glm::dvec3& band : cell.guessed)
-            cell.known = glm::max(cell.known - band, glm::dvec3(0.0));
-        cells.push_back(cell);
-    }
-    return cells;
-}
-
-void RoomLight::fitUnmeasured(const RoomLightOptions& options, Progress& progress)
-{
-    if (!options.fit_unmeasured) return;
-    const std::vector<LitCell> cells = litCells();
-    const LightFit fit = fitLightBands(cells);
-    const bool openings = scaleOpenings(fit, cells);
-    const bool clipped = scaleClipped(fit, cells);
-    if (!openings && !clipped) return;
-    buildTables(options.reference_point_m);
-    gatherCells(options, progress);
-}
-
-bool RoomLight::scaleOpenings(const LightFit& fit, std::span<const LitCell> cells)
-{
-    double guessed = 0.0;
-    double total = 0.0;
-    for (const LitCell& cell : cells) {
-        glm::dvec3 all = cell.known;
-        for (std::size_t band = 0; band < kLightBands; ++band) {
-            all += cell.guessed[band];
-            if (band != kClippedBand) guessed += cell.area * luminance(Rgb(cell.guessed[band]));
-        }
-        total += cell.area * luminance(Rgb(all));
-    }
-    if (!(guessed > 0.01 * total)) return false;
-    for (std::size_t i = 0; i < outside_band_.size(); ++i)
-        if (outside_band_[i] != kMeasured && outside_band_[i] != kClippedBand)
-            outside_.pixels.pixels()[i] *= Rgb(fit.factors[outside_band_[i]]);
-    findings_.push_back(
-        {Severity::Info,
-         "light-opening-fitted",
-         fmt::format("the light through the openings from directions the probe did not see was "
-                     "scaled by {:.2f} above, {:.2f} below and {:.2f} beside what it saw "
-                     "(luminance), so that it explains how bright the surfaces are",
-                     luminance(Rgb(fit.factors[kAboveBand])),
-                     luminance(Rgb(fit.factors[kBelowBand])),
-                     luminance(Rgb(fit.factors[kBesideBand])))});
-    return true;
-}
-
-bool RoomLight::scaleClipped(const LightFit& fit, std::span<const LitCell> cells)
-{
-    double bound = 0.0;
-    double total = 0.0;
-    for (const LitCell& cell : cells) {
-        bound += cell.area * luminance(Rgb(cell.guessed[kClippedBand]));
-        total += cell.area * luminance(Rgb(cell.known + cell.guessed[kClippedBand]));
-    }
-    if (!(bound > 0.0)) return false;
-    const glm::dvec3 sigma = fit.log_sigma[kClippedBand];
-    const glm::dvec3 factor = fit.factors[kClippedBand];
-    if (std::max({sigma.r, sigma.g, sigma.b}) > kBelievedLogSigma) {
-        findings_.push_back(
-            {Severity::Warning,
-             "light-clipped-unsolved",
-             fmt::format("lights that are clipped in every exposure give at least {:.2g} % of the "
-                         "light on the surfaces, perhaps much more, and no patch of their light "
-                         "tells: shadows may be too weak; add shorter exposures",
-                         100.0 * bound / total)});
-        return false;
-    }
-    for (std::size_t i = 0; i < outside_band_.size(); ++i)
-        if (outside_band_[i] == kClippedBand) outside_.pixels.pixels()[i] *= Rgb(factor);
-    for (std::size_t i = 0; i < clipped_.size(); ++i)
-        if (clipped_[i]) radiance_[i] *= Rgb(factor);
-    findings_.push_back(
-        {Severity::Info,
-         "light-clipped-solved",
-         fmt::format(
-             "lights that are clipped in every exposure were scaled by {:.3g} (red), {:.3g} "
-             "(green), {:.3g} (blue), each within about {:.0f} %, so that they explain how "
-             "bright the surfaces are that they light",
-             factor.r,
-             factor.g,
-             factor.b,
-             100.0 * std::max({sigma.r, sigma.g, sigma.b}))});
-    return true;
 }
 
 Rgb RoomLight::radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const

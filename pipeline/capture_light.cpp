@@ -1,9 +1,11 @@
 #include "capture/bracket.h"
+#include "capture/clipped_source.h"
 #include "capture/probe_views.h"
 #include "core/check.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "pipeline/insert.h"
+#include "pipeline/reference_capture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -33,26 +35,26 @@ EnvironmentMap readEnvironment(const std::filesystem::path& path)
     return environment;
 }
 
-/// Light of the probe's picture, and which pixels are only a lower bound (empty: none).
+/// Light of the probe's picture, and the part of it that is only a lower bound (empty: none).
 struct ProbePicture {
     Image<Rgb> radiance;
-    Image<std::uint8_t> clipped;
+    Image<Rgb> clipped;
 };
 
 /// Brackets of encoded photographs need a response; a single radiance file is linear already.
 /// The first view's response, once known, is the others'.
-ProbePicture probePicture(const ProjectView& view,
+ProbePicture probePicture(const std::vector<ProjectImage>& images,
                           const std::optional<ResponseCurve>& response,
                           const CaptureOptions& options,
                           CapturedLight& light)
 {
-    if (view.images.size() == 1 && isRadianceFile(view.images.front().path)) {
+    if (images.size() == 1 && isRadianceFile(images.front().path)) {
         light.response = ResponseCurve::srgb();
-        return {readRadiance(view.images.front().path).pixels, {}};
+        return {readRadiance(images.front().path).pixels, {}};
     }
     std::vector<std::filesystem::path> files;
     std::vector<Exposure> exposures;
-    for (const ProjectImage& image : view.images) {
+    for (const ProjectImage& image : images) {
         files.push_back(image.path);
         exposures.push_back(image.exposure);
     }
@@ -65,16 +67,11 @@ ProbePicture probePicture(const ProjectView& view,
     light.response = std::move(captured.response);
     light.response_known = captured.response_known;
     MergeResult& merged = captured.merged;
-    ProbePicture picture{std::move(merged.radiance.pixels), {}};
-    if (merged.clipped_fraction > 0.0) {
-        picture.clipped = std::move(merged.validity);
-        for (std::uint8_t& flags : picture.clipped.pixels())
-            flags &= kMergeClipped;
-    }
-    return picture;
+    Image<Rgb> clipped = clippedPart(merged);
+    return {std::move(merged.radiance.pixels), std::move(clipped)};
 }
 
-/// A picture of the whole sphere, and the shares of clipped pixels mapped in the same way.
+/// A picture of the whole sphere, and its clipped part mapped in the same way.
 LightProbe mapSphere(ProbeKind kind, const ProbePicture& picture, int width)
 {
     const auto map = [&](const Image<Rgb>& image) {
@@ -84,14 +81,7 @@ LightProbe mapSphere(ProbeKind kind, const ProbePicture& picture, int width)
     };
     LightProbe probe = map(picture.radiance);
     if (picture.clipped.empty()) return probe;
-    Image<Rgb> flags(picture.clipped.width(), picture.clipped.height());
-    for (std::size_t i = 0; i < flags.pixelCount(); ++i)
-        flags.pixels()[i] = Rgb(picture.clipped.pixels()[i] != 0 ? 1.0f : 0.0f);
-    const LightProbe shares = map(flags);
-    const Image<Rgb>& mapped = shares.environment.pixels;
-    probe.environment.clipped = Image<float>(mapped.width(), mapped.height());
-    for (std::size_t i = 0; i < mapped.pixelCount(); ++i)
-        probe.environment.clipped.pixels()[i] = mapped.pixels()[i].r;
+    probe.environment.clipped = map(picture.clipped).environment.pixels;
     return probe;
 }
 
@@ -102,6 +92,63 @@ Camera cameraOf(const ProjectView& view, const Camera* photo_camera, const Image
             view.ball, *view.view_position_m, radiance.width(), radiance.height(), view.view_up);
     INSITU_CHECK(photo_camera != nullptr, "a view of the photograph's camera, which is not given");
     return *photo_camera;
+}
+
+/// Cards and balls in the probe's pictures, or in pictures of their own; numbers as given.
+void captureReferences(const ProjectProbe& probe,
+                       const ProbePicture& first_view,
+                       const Camera* photo_camera,
+                       const std::optional<ResponseCurve>& response,
+                       const CaptureOptions& options,
+                       CapturedLight& light)
+{
+    for (const ProjectReference& reference : probe.references) {
+        if (reference.kind != ReferenceKind::Card && reference.kind != ReferenceKind::Ball)
+            continue;
+        if (reference.source == ProjectReference::Source::Photo) continue;
+        const bool ball = reference.kind == ReferenceKind::Ball;
+        Camera camera;
+        ReferenceGroup group;
+        if (reference.source == ProjectReference::Source::Probe) {
+            const ProjectView& view = probe.views[0];
+            if (ball) camera = cameraOf(view, photo_camera, first_view.radiance);
+            group = measureReference(reference,
+                                     {first_view.radiance,
+                                      first_view.clipped,
+                                      view.crop_origin_px,
+                                      &camera,
+                                      view.images.front().path.string()},
+                                     probe.center_m,
+                                     light.findings);
+        } else {
+            CapturedLight own;
+            const ProbePicture picture = probePicture(reference.images, response, options, own);
+            append(light.findings, std::move(own.findings));
+            if (ball) {
+                MirrorBall outline;
+                outline.center_px = reference.center_px;
+                outline.radius_px = reference.radius_px;
+                outline.radius_m = reference.radius_m;
+                outline.center_m = reference.position_m.value_or(probe.center_m);
+                camera = ballCamera(outline,
+                                    reference.view_position_m,
+                                    picture.radiance.width(),
+                                    picture.radiance.height(),
+                                    reference.view_up);
+            }
+            group = measureReference(reference,
+                                     {picture.radiance,
+                                      picture.clipped,
+                                      glm::dvec2(0.0),
+                                      &camera,
+                                      reference.images.front().path.string()},
+                                     probe.center_m,
+                                     light.findings);
+        }
+        light.references.push_back(std::move(group));
+    }
+    for (ReferenceGroup& group : givenReferences(probe.references, probe.center_m))
+        light.references.push_back(std::move(group));
 }
 
 }  // namespace
@@ -120,10 +167,12 @@ CapturedLight captureProbe(
     std::vector<ProbePicture> pictures;
     for (const ProjectView& view : probe.views) {
         const bool known = light.response_known;
-        pictures.push_back(probePicture(view, response, options, light));
+        pictures.push_back(probePicture(view.images, response, options, light));
         light.response_known = light.response_known || known;
         if (!response && light.response_known) response = light.response;
     }
+    // Views are merged from what they are moved into; references look at the first one as it was.
+    const ProbePicture first = probe.references.empty() ? ProbePicture{} : pictures[0];
     LightProbe made;
     if (probe.kind != ProbeKind::MirrorBall) {
         made = mapSphere(probe.kind, pictures[0], width);
@@ -159,6 +208,7 @@ CapturedLight captureProbe(
     }
     append(light.findings, std::move(made.findings));
     light.environment = std::move(made.environment);
+    captureReferences(probe, first, photo_camera, response, options, light);
     return light;
 }
 

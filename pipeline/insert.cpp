@@ -6,6 +6,7 @@
 #include "core/io/image_io.h"
 #include "pipeline/probe_location.h"
 #include "pipeline/radiance_mesh_stage.h"
+#include "pipeline/reference_capture.h"
 #include "pipeline/stage_cache.h"
 #include "pipeline/stage_parts.h"
 #include "reconstruct/room_bounds.h"
@@ -101,58 +102,36 @@ void choosePhotoResponse(const Project& project, InsertResult& result)
     result.photo_relative_exposure = relative.value_or(1.0);
 }
 
-/// Compares probe and photograph on the surfaces that both see; brings the layers to the
-/// photograph's unit where exposures could not.
-void matchLightToPhoto(const Image<Rgb>& photo, bool unit_known, InsertResult& result)
+/// The photograph's light, and the same in the light probe's exposure and white balance for the
+/// stages that make the room's light from both: nothing where their units cannot be compared.
+struct PhotoLight {
+    Image<Rgb> taken;
+    std::optional<PhotographedRadiance> in_probe_unit;
+};
+
+PhotoLight photoLight(const Project& project,
+                      const SceneProxy& proxy,
+                      const glm::dmat3& primaries,
+                      InsertResult& result)
 {
-    RenderLayers& layers = result.render.layers;
-    std::vector<double> ratios;
-    const double clip =
-        0.95 * result.photo_response.exposure[1][255] / result.photo_relative_exposure;
-    for (std::size_t i = 0; i < photo.pixelCount(); ++i) {
-        const Rgb seen = layers.probe_radiance.pixels()[i];
-        const Rgb taken = photo.pixels()[i];
-        const float brightest = std::max({taken.r, taken.g, taken.b});
-        if (luminance(seen) > 0.0f && brightest < clip && brightest > 0.02 * clip)
-            ratios.push_back(std::log(luminance(seen) / luminance(taken)));
-    }
-    if (ratios.size() < 100) return;
-    const auto quantile = [&](double q) {
-        const auto at = ratios.begin() + static_cast<std::ptrdiff_t>(q * double(ratios.size() - 1));
-        std::nth_element(ratios.begin(), at, ratios.end());
-        return *at;
-    };
-    result.light_to_photo = std::exp(quantile(0.5));
-    result.light_to_photo_spread = 0.5 * (quantile(0.75) - quantile(0.25));
-    if (unit_known) {
-        if (std::abs(std::log(result.light_to_photo)) > std::log(1.25))
-            result.findings.push_back(
-                {Severity::Warning,
-                 "light-photo-mismatch",
-                 fmt::format(
-                     "surfaces seen by both are {:.2f} times as bright in the light probe as "
-                     "in the photograph (spread {:.0f} %): check the exposures, the ball's "
-                     "reflectance and the room's dimensions",
-                     result.light_to_photo,
-                     100.0 * result.light_to_photo_spread)});
-        return;
-    }
-    const float scale = static_cast<float>(1.0 / result.light_to_photo);
-    for (auto* image : {&layers.object,
-                        &layers.irradiance_with,
-                        &layers.irradiance_without,
-                        &layers.probe_radiance})
-        for (Rgb& value : image->pixels())
-            value *= scale;
-    for (float& value : layers.object_variance.pixels())
-        value *= scale * scale;
-    result.findings.push_back(
-        {Severity::Info,
-         "light-scale-from-photograph",
-         fmt::format("the light's exposure is unknown; scaled by {:.4g} so that surfaces seen by "
-                     "both agree (spread {:.0f} %)",
-                     1.0 / result.light_to_photo,
-                     100.0 * result.light_to_photo_spread)});
+    PhotoLight light;
+    light.taken = photographedRadiance(
+        result.photo.image, result.photo_response, result.photo_relative_exposure, primaries);
+    glm::dvec3 clip;
+    for (std::size_t c = 0; c < 3; ++c)
+        clip[static_cast<int>(c)] =
+            result.photo_response.exposure[c][255] / result.photo_relative_exposure;
+    const Camera& camera = result.camera.camera;
+    result.balance = measurePhotoBalance(
+        light.taken, clip, camera, proxy, result.light.environment, result.light.center_m);
+    choosePhotoBalance(project.white_balance, result.light.radiance_unit_known, result.balance);
+    append(result.findings, std::move(result.balance.findings));
+    if (!result.light.radiance_unit_known) return light;
+    light.in_probe_unit = {camera, light.taken};
+    if (result.balance.used != glm::dvec3(1.0))
+        for (Rgb& value : light.in_probe_unit->radiance.pixels())
+            value /= Rgb(result.balance.used);
+    return light;
 }
 
 /// Objects into the world; what looks like a wrong scale or place is a finding.
@@ -201,6 +180,11 @@ CapturedLight cachedLight(const Project& project,
         by_photo = by_photo || !view.view_position_m;
     }
     if (probe.response) key.add(probe.response->filename().string()).addFile(*probe.response);
+    for (const ProjectReference& reference : probe.references) {
+        key.add(reference);
+        for (const ProjectImage& image : reference.images)
+            key.addFile(image.path);
+    }
     if (by_photo) key.add(camera);
     key.add(proxy.faces(), proxy.openings(), options.capture);
     if (auto kept = cache.find<CapturedLight>(key)) {
@@ -239,6 +223,32 @@ glm::dvec3 objectsCenter(const ObjectScene& objects)
     for (const BoundingBox& box : objects.bounds())
         sum += 0.5 * (box.min + box.max);
     return sum / std::max<double>(1.0, static_cast<double>(objects.bounds().size()));
+}
+
+/// What probe, numbers and photograph tell of the light; the last where both share a unit.
+std::vector<ReferenceGroup> allReferences(const Project& project,
+                                          const std::optional<PhotographedRadiance>& photographed,
+                                          InsertResult& result)
+{
+    std::vector<ReferenceGroup> groups = result.light.references;
+    if (!project.light.probe) return groups;
+    const std::string name = project.photo.path.string();
+    const auto in_photo = [](const ProjectReference& reference) {
+        return reference.source == ProjectReference::Source::Photo;
+    };
+    if (!photographed && std::ranges::any_of(project.light.probe->references, in_photo))
+        throw InputError(name,
+                         "cannot show a reference: its unit is not the probe's, whose exposures "
+                         "are unknown; give \"in\": \"probe\" or images of its own");
+    if (!photographed) return groups;
+    for (ReferenceGroup& group : photographedReferences(*project.light.probe,
+                                                        result.photo.image,
+                                                        photographed->radiance,
+                                                        photographed->camera,
+                                                        name,
+                                                        result.findings))
+        groups.push_back(std::move(group));
+    return groups;
 }
 
 /// Room light and render: what takes the time, and is kept whole.
@@ -338,20 +348,18 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     watch.lap("probe", from_cache);
 
     const glm::dmat3 primaries = result.photo.metadata.color.rec709_from_linear;
-    // The photograph stands in for surfaces the probe did not see, where both share a unit.
-    const Image<Rgb> photo_radiance = photographedRadiance(
-        result.photo.image, result.photo_response, result.photo_relative_exposure, primaries);
-    std::optional<PhotographedRadiance> photographed;
-    if (result.light.radiance_unit_known) photographed = {camera, photo_radiance};
+    // The photograph stands in for surfaces the probe did not see.
+    const auto [photo_radiance, photographed] = photoLight(project, proxy, primaries, result);
     InsertOptions with_atlases = options;
     if (options.render.fiv.atlas_folder.empty() && !options.cache_folder.empty())
         with_atlases.render.fiv.atlas_folder = options.cache_folder / "atlas";
+    with_atlases.light.references = allReferences(project, photographed, result);
     RenderStage stage{camera, proxy, result.light, photographed, with_atlases};
     RenderedStage rendered = stage.run(std::move(objects), cache, watch, progress);
     append(result.findings, std::move(rendered.light_findings));
     result.render = std::move(rendered.render);
     append(result.findings, result.render.findings);
-    matchLightToPhoto(photo_radiance, result.light.radiance_unit_known, result);
+    scaleLight(result.render.layers, result.balance.used);
 
     for (const ProjectForeground& foreground : project.foreground)
         putBehindForeground(foregroundOf(foreground, result.photo.image),
@@ -386,14 +394,12 @@ ProjectRadianceMesh projectRadianceMesh(const Project& given,
     result.light = captureLight(project, proxy, result.camera.camera, options);
     append(result.findings, result.light.findings);
     choosePhotoResponse(project, result);
-    std::optional<PhotographedRadiance> photographed;
-    if (result.light.radiance_unit_known)
-        photographed = {
-            result.camera.camera,
-            photographedRadiance(
-                result.photo.image, result.photo_response, result.photo_relative_exposure)};
+    const std::optional<PhotographedRadiance> photographed =
+        photoLight(project, proxy, result.photo.metadata.color.rec709_from_linear, result)
+            .in_probe_unit;
     RoomLightOptions light_options = options.light;
     light_options.reference_point_m = project.objects.front().position_m;
+    light_options.references = allReferences(project, photographed, result);
     const RoomLight room(proxy,
                          result.light.environment,
                          result.light.center_m,

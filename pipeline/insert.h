@@ -4,6 +4,8 @@
 #include "composite/differential.h"
 #include "core/environment_map.h"
 #include "core/progress.h"
+#include "lighting/light_reference.h"
+#include "pipeline/photo_balance.h"
 #include "pipeline/project.h"
 #include "render/renderer.h"
 
@@ -41,6 +43,8 @@ struct CapturedLight {
     bool response_known = false;       ///< recovered or given, not assumed
     bool radiance_unit_known = false;  ///< exposures are known, so that photographs compare
     PhotoMetadata metadata;
+    /// What was measured of the light, all but what only the photograph shows.
+    std::vector<ReferenceGroup> references;
     Findings findings;
 };
 
@@ -52,10 +56,7 @@ struct InsertResult {
     CapturedLight light;
     InsertionResult render;
     Composite composite;
-    /// Median over surfaces that both see of probe radiance / photographed radiance (luminance),
-    /// and half the interquartile range of its natural logarithm. 0 when they share no pixel.
-    double light_to_photo = 0.0;
-    double light_to_photo_spread = 0.0;
+    PhotoBalance balance;
     Findings findings;  ///< of all stages, in order
     std::vector<StageTime> times;
 };
@@ -65,10 +66,10 @@ struct InsertResult {
 [[nodiscard]] CameraEstimate solveCamera(const Project& project,
                                          const Photo& photo,
                                          bool use_exif_focal);
-/// Brackets → response → radiance → environment at the probe's centre. All views take the first
-/// one's response. `photo_camera` may be absent when no view is the photograph's;
-/// `distance_to_room` as in UnwrapOptions. InputError: also a mask that is not of its pictures'
-/// size.
+/// Brackets → response → radiance → environment at the probe's centre, and what its references
+/// measured. All views, and pictures of references, take the first one's response. `photo_camera`
+/// may be absent when no view is the photograph's; `distance_to_room` as in UnwrapOptions.
+/// InputError: also a mask that is not of its pictures' size.
 [[nodiscard]] CapturedLight captureProbe(
     const ProjectProbe& probe,
     const Camera* photo_camera,

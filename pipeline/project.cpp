@@ -43,6 +43,26 @@ std::vector<ProjectForeground> readForeground(const JsonNode& list,
     return marks;
 }
 
+ProjectWhiteBalance readWhiteBalance(const JsonNode& node)
+{
+    using Mode = ProjectWhiteBalance::Mode;
+    if (!node.value().is_array()) {
+        if (!node.value().is_string())
+            node.fail(
+                "must be \"auto\", \"none\", \"solved\" or three numbers, the photograph's "
+                "light over the probe's in red, green and blue");
+        const std::string mode = readChoice(node, {"auto", "none", "solved"});
+        return {mode == "auto"   ? Mode::Auto
+                : mode == "none" ? Mode::None
+                                 : Mode::Solved,
+                {1, 1, 1}};
+    }
+    const glm::dvec3 gains = node.vec3();
+    for (int c = 0; c < 3; ++c)
+        if (!(gains[c] > 1e-3 && gains[c] < 1e3)) node.fail("must be between 0.001 and 1000");
+    return {Mode::Given, gains};
+}
+
 ProjectLight readLight(const JsonNode& node, const std::filesystem::path& folder)
 {
     node.expectKeys(keys::kLight);
@@ -114,6 +134,8 @@ Project readProject(const std::filesystem::path& path)
     const JsonNode photo = root.at("photo");
     photo.expectKeys(keys::kPhoto);
     project.photo = {existingFile(photo.at("image"), folder), readExposure(photo)};
+    if (const auto balance = photo.find("white_balance"))
+        project.white_balance = readWhiteBalance(*balance);
     if (const auto foreground = photo.find("foreground"))
         project.foreground = readForeground(*foreground, folder);
     readCamera(root.at("camera"), folder, project);

@@ -21,6 +21,14 @@ struct ProjectImage {
     Exposure exposure;  ///< only what the project file gives
 };
 
+/// `photo.white_balance`: how the photograph's exposure and colour follow from the light probe's
+/// (pipeline/photo_balance.h).
+struct ProjectWhiteBalance {
+    enum class Mode { Auto, None, Solved, Given };
+    Mode mode = Mode::Auto;
+    glm::dvec3 gains{1.0};  ///< Given: the photograph's radiance over the probe's
+};
+
 /// An entry of `photo.foreground`: what stands before the objects (composite/foreground.h).
 struct ProjectForeground {
     ForegroundMark mark;                        ///< without its mask
@@ -41,6 +49,31 @@ struct ProjectView {
     std::optional<std::filesystem::path> mask;
 };
 
+enum class ReferenceKind { Card, Ball, Illuminance, Irradiance };
+
+/// An entry of `light.probe.references`: what was measured of the light, to tell how strong lights
+/// are that are clipped in every exposure (lighting/light_reference.h).
+struct ProjectReference {
+    ReferenceKind kind = ReferenceKind::Card;
+    std::optional<glm::dvec3> position_m;  ///< nothing: the probe's centre
+    glm::dvec3 normal{0.0, 1.0, 0.0};      ///< unit; not of a ball
+    double sigma = 0.03;                   ///< relative standard deviation
+    glm::dvec3 irradiance{0.0};            ///< Irradiance; Illuminance: lux, three times
+
+    enum class Source { Probe, Photo, Own };
+    Source source = Source::Probe;      ///< card or ball: whose pictures show it
+    std::vector<ProjectImage> images;   ///< its own
+    glm::dvec2 area_from_px{0.0};       ///< card: top left corner, in the full frame
+    glm::dvec2 area_size_px{0.0};       ///< card
+    glm::dvec2 center_px{0.0};          ///< ball: of its outline, in the full frame
+    double radius_px = 0.0;             ///< ball
+    double radius_m = 0.0;              ///< ball, with pictures of its own
+    bool reflectance_known = true;      ///< false, of a ball: only its shading counts
+    glm::dvec3 reflectance{1.0};        ///< Lambert's, (0, 1]
+    glm::dvec3 view_position_m{0.0};    ///< ball, with pictures of its own: their camera
+    glm::dvec3 view_up{0.0, 1.0, 0.0};  ///< likewise
+};
+
 /// `light.probe`: brackets of a light probe.
 struct ProjectProbe {
     ProbeKind kind = ProbeKind::MirrorBall;
@@ -50,6 +83,7 @@ struct ProjectProbe {
     /// that of the views' balls.
     bool center_from_outline = false;
     std::optional<std::filesystem::path> response;  ///< a saved response curve
+    std::vector<ProjectReference> references;
 };
 
 struct ProjectLight {
@@ -72,6 +106,7 @@ struct ProjectObject {
 struct Project {
     std::filesystem::path file;
     ProjectImage photo;
+    ProjectWhiteBalance white_balance;
     std::vector<ProjectForeground> foreground;
     std::optional<std::filesystem::path> camera_lines;
     std::optional<std::filesystem::path> camera_file;

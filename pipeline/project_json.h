@@ -38,6 +38,12 @@ namespace insitu {
 [[nodiscard]] Exposure readExposure(const JsonNode& node);
 /// A picture with its exposure: `photo`, or an entry of `images`.
 [[nodiscard]] ProjectImage readImage(const JsonNode& node, const std::filesystem::path& folder);
+/// `images` with the exposure members beside it: one time for all or a list, one an image.
+[[nodiscard]] std::vector<ProjectImage> readImages(const JsonNode& node,
+                                                   const std::filesystem::path& folder);
+/// `light.probe.references`.
+[[nodiscard]] std::vector<ProjectReference> readReferences(const JsonNode& list,
+                                                           const std::filesystem::path& folder);
 /// `light.probe`.
 [[nodiscard]] ProjectProbe readProbe(const JsonNode& node, const std::filesystem::path& folder);
 /// A number in [0, 1].

@@ -12,7 +12,8 @@ using KeyList = std::initializer_list<std::string_view>;
 inline const KeyList kProject = {
     "format", "version", "photo", "camera", "light", "room", "objects", "note"};
 inline const KeyList kImage = {"image", "exposure_seconds", "f_number", "iso"};
-inline const KeyList kPhoto = {"image", "exposure_seconds", "f_number", "iso", "foreground"};
+inline const KeyList kPhoto = {
+    "image", "exposure_seconds", "f_number", "iso", "white_balance", "foreground"};
 inline const KeyList kForeground = {
     "polygon_px", "mask", "distance_m", "feather_px", "refine_px", "note"};
 inline const KeyList kCamera = {"lines", "file"};
@@ -28,12 +29,43 @@ inline const KeyList kProbe = {"kind",
                                "view",
                                "mask",
                                "views",
-                               "response"};
+                               "response",
+                               "references"};
 inline const KeyList kProbeView = {
     "images", "exposure_seconds", "f_number", "iso", "ball", "view", "mask"};
 inline const KeyList kBall = {
     "center_px", "radius_px", "radius_m", "reflectance", "crop_origin_px"};
 inline const KeyList kView = {"position_m", "up"};
+inline const KeyList kReferenceCard = {"type",
+                                       "in",
+                                       "images",
+                                       "exposure_seconds",
+                                       "f_number",
+                                       "iso",
+                                       "area_px",
+                                       "reflectance",
+                                       "position_m",
+                                       "normal",
+                                       "sigma_percent",
+                                       "note"};
+inline const KeyList kReferenceBall = {"type",
+                                       "in",
+                                       "images",
+                                       "exposure_seconds",
+                                       "f_number",
+                                       "iso",
+                                       "view",
+                                       "center_px",
+                                       "radius_px",
+                                       "radius_m",
+                                       "reflectance",
+                                       "position_m",
+                                       "sigma_percent",
+                                       "note"};
+inline const KeyList kReferenceIlluminance = {
+    "type", "lux", "position_m", "normal", "sigma_percent", "note"};
+inline const KeyList kReferenceIrradiance = {
+    "type", "value", "position_m", "normal", "sigma_percent", "note"};
 inline const KeyList kFloor = {"type", "height_m", "half_size_m"};
 inline const KeyList kPlane = {"type", "corner_m", "edge_u_m", "edge_v_m", "corners_m"};
 inline const KeyList kBox = {"type", "min_m", "max_m", "rotation_y_deg", "solid", "name"};

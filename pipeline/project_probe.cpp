@@ -18,18 +18,15 @@ Exposure readExposure(const JsonNode& node)
     return exposure;
 }
 
-namespace {
-
-/// `images` with the exposure members beside it: one time for all or a list, one an image.
-std::vector<ProjectImage> readImages(const JsonNode& probe, const std::filesystem::path& folder)
+std::vector<ProjectImage> readImages(const JsonNode& node, const std::filesystem::path& folder)
 {
-    const JsonNode list = probe.at("images");
+    const JsonNode list = node.at("images");
     if (list.size() == 0) list.fail("is empty; name the pictures of the bracket");
 
     Exposure common;
-    if (const auto value = probe.find("f_number")) common.f_number = value->positive();
-    if (const auto value = probe.find("iso")) common.iso = value->positive();
-    const auto times = probe.find("exposure_seconds");
+    if (const auto value = node.find("f_number")) common.f_number = value->positive();
+    if (const auto value = node.find("iso")) common.iso = value->positive();
+    const auto times = node.find("exposure_seconds");
     const bool one_each = times && times->value().is_array();
     if (one_each && times->size() != list.size())
         times->fail(fmt::format("has {} times for {} images", times->size(), list.size()));
@@ -52,6 +49,8 @@ std::vector<ProjectImage> readImages(const JsonNode& probe, const std::filesyste
     }
     return images;
 }
+
+namespace {
 
 void readBall(const JsonNode& node, ProjectView& view)
 {
@@ -160,6 +159,18 @@ ProjectProbe readProbe(const JsonNode& node, const std::filesystem::path& folder
         center.fail("\"from-outline\" needs a mirror ball with \"view\": \"photo\"");
     if (const auto response = node.find("response"))
         probe.response = existingFile(*response, folder);
+    if (const auto references = node.find("references"))
+        probe.references = readReferences(*references, folder);
+    for (std::size_t i = 0; i < probe.references.size(); ++i)
+        if (probe.kind != ProbeKind::MirrorBall &&
+            probe.references[i].kind == ReferenceKind::Ball &&
+            probe.references[i].source == ProjectReference::Source::Probe)
+            node.at("references")
+                .at(i)
+                .fail(
+                    "is a grey ball in pictures of the whole sphere, whose camera is not known: "
+                    "give "
+                    "it images of its own, or \"in\": \"photo\"");
     return probe;
 }
 
@@ -171,6 +182,9 @@ ProjectProbe readProbeFile(const std::filesystem::path& path)
     for (const ProjectView& view : probe.views)
         if (probe.kind == ProbeKind::MirrorBall && !view.view_position_m)
             root.fail("has a view \"photo\", but there is no photograph here: give position_m");
+    for (const ProjectReference& reference : probe.references)
+        if (reference.source == ProjectReference::Source::Photo)
+            root.at("references").fail("has one in the photograph, and there is none here");
     return probe;
 }
 

@@ -39,6 +39,19 @@ Json placementsJson(const Project& project, const CameraEstimate& estimate)
     return list;
 }
 
+/// Gains: the photograph's light over the probe's.
+Json balanceJson(const PhotoBalance& balance)
+{
+    Json json = {{"pixels", balance.pixels}, {"used", toJson(balance.used)}};
+    if (balance.pixels == 0) return json;
+    json["measured"] = toJson(balance.measured);
+    json["spread"] = toJson(balance.spread);
+    json["color_sigma"] = toJson(balance.color_sigma);
+    json["luminance"] = balance.luminance;
+    json["luminance_spread"] = balance.luminance_spread;
+    return json;
+}
+
 }  // namespace
 
 void writeReport(const std::filesystem::path& path,
@@ -68,8 +81,7 @@ void writeReport(const std::filesystem::path& path,
           {"response", result.light.response.source},
           {"photo_response", result.photo_response.source},
           {"photo_relative_exposure", result.photo_relative_exposure},
-          {"light_to_photo", result.light_to_photo},
-          {"light_to_photo_spread", result.light_to_photo_spread}}},
+          {"white_balance", balanceJson(result.balance)}}},
         {"render",
          {{"technique", techniqueName(result.render.technique)},
           {"seed", options.render.seed},

@@ -41,10 +41,26 @@ void parts(auto& archive, PartsOf<EnvironmentMap> auto& v)
 {
     archive(v.pixels, v.clipped);
 }
+void parts(auto& archive, PartsOf<LightReference> auto& v)
+{
+    archive(v.position_m, v.normal, v.irradiance, v.log_sigma);
+}
+void parts(auto& archive, PartsOf<ReferenceGroup> auto& v)
+{
+    archive(v.name, v.places, v.common_log_sigma, v.scale_free, v.luminance_only);
+}
+void parts(auto& archive, PartsOf<ProjectReference> auto& v)
+{
+    archive(v.kind, v.position_m, v.normal, v.sigma, v.irradiance, v.source, v.area_from_px);
+    archive(v.area_size_px, v.center_px, v.radius_px, v.radius_m, v.reflectance_known);
+    archive(v.reflectance, v.view_position_m, v.view_up);
+    for (auto& image : v.images)
+        archive(image.exposure);
+}
 void parts(auto& archive, PartsOf<CapturedLight> auto& v)
 {
     archive(v.environment, v.center_m, v.response, v.response_known, v.radiance_unit_known);
-    archive(v.metadata, v.findings);
+    archive(v.metadata, v.references, v.findings);
 }
 void parts(auto& archive, PartsOf<RenderLayers> auto& v)
 {
@@ -134,7 +150,7 @@ void parts(auto& archive, PartsOf<CaptureOptions> auto& v)
 void parts(auto& archive, PartsOf<RoomLightOptions> auto& v)
 {
     archive(v.texel_m, v.cell_m, v.rays_per_cell, v.fit_unmeasured, v.reference_point_m);
-    archive(v.seed);
+    archive(v.references, v.seed);
 }
 void parts(auto& archive, PartsOf<PathOptions> auto& v)
 {
@@ -168,7 +184,7 @@ static_assert(sizeof(ResponseOptions) == 24 && sizeof(MergeOptions) == 120);
 static_assert(sizeof(ChannelNoise) == 32 && sizeof(NoiseModel) == 96);
 static_assert(sizeof(AlignmentOptions) == 32 && sizeof(DeghostOptions) == 24);
 static_assert(sizeof(CaptureOptions) == 208);
-static_assert(sizeof(RoomLightOptions) == 56 && sizeof(PathOptions) == 8);
+static_assert(sizeof(RoomLightOptions) == 80 && sizeof(PathOptions) == 8);
 static_assert(sizeof(InterreflectionOptions) == 24 && sizeof(IrradianceFilterOptions) == 16);
 static_assert(sizeof(AtlasOptions) == 12 && sizeof(FivOptions) == 104);
 static_assert(sizeof(InsertionOptions) == 192);

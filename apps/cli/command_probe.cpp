@@ -1,10 +1,13 @@
 #include "apps/cli/bracket_input.h"
 #include "apps/cli/command.h"
+#include "apps/cli/reference_input.h"
 #include "capture/ball_outline.h"
+#include "capture/clipped_source.h"
 #include "capture/light_probe.h"
 #include "capture/probe_views.h"
 #include "core/io/image_io.h"
 #include "pipeline/insert.h"
+#include "pipeline/reference_capture.h"
 
 #include <algorithm>
 #include <array>
@@ -16,6 +19,7 @@ namespace {
 
 struct ProbeArguments {
     BracketArguments bracket;
+    ReferenceArguments references;
     std::filesystem::path output;
     std::string kind = "mirror-ball";
     std::optional<std::array<double, 2>> center_px;
@@ -34,13 +38,49 @@ glm::dvec3 toVec3(const std::array<double, 3>& v)
     return {v[0], v[1], v[2]};
 }
 
+/// The pictures' light, and the part of it that is only a lower bound (empty: none is known).
+struct ProbePicture {
+    Image<Rgb> radiance;
+    Image<Rgb> clipped;
+};
+
 /// One radiance file, or a bracket to be merged.
-Image<Rgb> readProbeRadiance(const ProbeArguments& arguments, Context& context)
+ProbePicture readProbePicture(const ProbeArguments& arguments, Context& context)
 {
     const auto& images = arguments.bracket.images;
     if (images.size() == 1 && isRadianceFile(images.front()))
-        return readRadiance(images.front()).pixels;
-    return mergeArguments(arguments.bracket, context).merged.radiance.pixels;
+        return {readRadiance(images.front()).pixels, {}};
+    const CapturedRadiance captured = mergeArguments(arguments.bracket, context);
+    return {captured.merged.radiance.pixels, clippedPart(captured.merged)};
+}
+
+/// Cards, balls and numbers against the environment; scales what is clipped.
+Findings applyGiven(const ProbeArguments& arguments,
+                    const ProbePicture& picture,
+                    const Camera* camera,
+                    EnvironmentMap& environment)
+{
+    const std::vector<ProjectReference> references = referencesOf(arguments.references);
+    const glm::dvec3 center(0.0);  // all light is taken to be far
+    Findings findings;
+    std::vector<ReferenceGroup> groups;
+    for (const ProjectReference& reference : references) {
+        if (reference.kind == ReferenceKind::Ball && camera == nullptr)
+            throw InputError("--grey-ball", "needs a mirror ball beside it, whose camera is known");
+        if (reference.kind == ReferenceKind::Card || reference.kind == ReferenceKind::Ball)
+            groups.push_back(measureReference(reference,
+                                              {picture.radiance,
+                                               picture.clipped,
+                                               glm::dvec2(0.0),
+                                               camera,
+                                               arguments.bracket.images.front().string()},
+                                              center,
+                                              findings));
+    }
+    for (ReferenceGroup& group : givenReferences(references, center))
+        groups.push_back(std::move(group));
+    append(findings, applyReferences(groups, environment));
+    return findings;
 }
 
 /// The outline given, or else found in the picture, or else that of a ball that fills it.
@@ -86,8 +126,9 @@ void placeOutline(const Image<Rgb>& radiance,
 }
 
 /// What was not given is found in the picture, or taken from the usual shot: seen from +z.
-LightProbe unwrapBall(const Image<Rgb>& radiance, const ProbeArguments& arguments)
+LightProbe unwrapBall(const ProbePicture& picture, const ProbeArguments& arguments)
 {
+    const Image<Rgb>& radiance = picture.radiance;
     MirrorBall ball;
     Findings assumed;
     placeOutline(radiance, arguments, ball, assumed);
@@ -109,15 +150,33 @@ LightProbe unwrapBall(const Image<Rgb>& radiance, const ProbeArguments& argument
     if (arguments.mask.empty()) {
         UnwrapOptions options;
         options.width = arguments.width;
+        if (!picture.clipped.empty()) options.clipped = &picture.clipped;
         probe = unwrapMirrorBall(radiance, ball, camera, options);
     } else {
         MergeViewsOptions options;
         options.width = arguments.width;
         ProbeMask mask = readProbeMask(arguments.mask, radiance.width(), radiance.height());
-        probe = mergeProbeViews({{radiance, ball, camera, {}, std::move(mask)}}, options).probe;
+        probe = mergeProbeViews({{radiance, ball, camera, {}, std::move(mask), picture.clipped}},
+                                options)
+                    .probe;
     }
+    append(probe.findings, applyGiven(arguments, picture, &camera, probe.environment));
     append(assumed, std::move(probe.findings));
     probe.findings = std::move(assumed);
+    return probe;
+}
+
+LightProbe mapSphere(const ProbePicture& picture, const ProbeArguments& arguments)
+{
+    const auto map = [&](const Image<Rgb>& image) {
+        return arguments.kind == "latlong"   ? probeFromLatLong(image, arguments.width)
+               : arguments.kind == "angular" ? probeFromAngularMap(image, arguments.width)
+                                             : probeFromCubeCross(image, arguments.width);
+    };
+    LightProbe probe = map(picture.radiance);
+    if (!picture.clipped.empty())
+        probe.environment.clipped = map(picture.clipped).environment.pixels;
+    append(probe.findings, applyGiven(arguments, picture, nullptr, probe.environment));
     return probe;
 }
 
@@ -129,24 +188,22 @@ void runProbe(const ProbeArguments& arguments, Context& context)
         throw InputError(arguments.output.string(), "radiance is written as .exr, .hdr or .pfm");
     const auto& images = arguments.bracket.images;
     if (images.size() == 1 && images.front().extension() == ".json") {
-        const CapturedLight light = captureProbe(
+        if (!referencesOf(arguments.references).empty())
+            throw InputError(images.front().string(),
+                             "holds its own \"references\": add the card, ball and readings there");
+        CapturedLight light = captureProbe(
             readProbeFile(images.front()), nullptr, {}, arguments.bracket.capture, arguments.width);
+        append(light.findings, applyReferences(light.references, light.environment));
         context.print(light.findings);
         writeRadiance(arguments.output, light.environment.pixels);
         return;
     }
     if (!arguments.mask.empty() && arguments.kind != "mirror-ball")
         throw InputError("--mask", "belongs to a mirror ball");
-    const Image<Rgb> radiance = readProbeRadiance(arguments, context);
-    LightProbe probe;
-    if (arguments.kind == "latlong")
-        probe = probeFromLatLong(radiance, arguments.width);
-    else if (arguments.kind == "angular")
-        probe = probeFromAngularMap(radiance, arguments.width);
-    else if (arguments.kind == "cube-cross")
-        probe = probeFromCubeCross(radiance, arguments.width);
-    else
-        probe = unwrapBall(radiance, arguments);
+    (void)referencesOf(arguments.references);  // refused before the work
+    const ProbePicture picture = readProbePicture(arguments, context);
+    const LightProbe probe = arguments.kind == "mirror-ball" ? unwrapBall(picture, arguments)
+                                                             : mapSphere(picture, arguments);
     context.print(probe.findings);
     writeRadiance(arguments.output, probe.environment.pixels);
 }
@@ -206,6 +263,7 @@ void registerProbe(CLI::App& app, Context& context)
         ->check(CLI::IsMember({"mirror-ball", "angular", "latlong", "cube-cross"}))
         ->capture_default_str();
     addBallOptions(*command, *arguments);
+    addReferenceOptions(*command, arguments->references);
     command->add_option("--width", arguments->width, "Width of the environment (0: automatic)")
         ->check(CLI::Range(0, 16384))
         ->capture_default_str();
@@ -215,6 +273,7 @@ void registerProbe(CLI::App& app, Context& context)
         "  insitu probe ball.exr -o env.exr --center 300,300 --radius 260.8\n"
         "  insitu probe probe.json -o env.exr    (several views: docs/file_format.md, probe)\n"
         "  insitu probe ball_1.jpg ball_2.jpg ball_3.jpg -o env.exr --radius-m 0.06\n"
+        "  insitu probe ball_*.jpg -o env.exr --card 40,30,60,60 --card-normal 0,0,1\n"
         "  insitu probe angular.hdr --kind angular -o env.exr --width 1024");
     command->callback([arguments, &context] { runProbe(*arguments, context); });
 }

@@ -1,5 +1,6 @@
 #include "capture/hdr_merge.h"
 
+#include "capture/clipped_source.h"
 #include "core/parallel.h"
 #include "tests/capture/synthetic_bracket.h"
 #include "tests/support/tolerance.h"
@@ -145,6 +146,21 @@ TEST(MergeBracket, ABrightCodeBesideAClippedChannelIsALowerBound)
     EXPECT_LT(merged.variance(0, 0).b, 0.01f * squared(radiance.b));
     bracket.frames[1].image.codes(0, 0).y = 190;
     EXPECT_LT(mergeBracket(bracket, squares(), {}).variance(0, 0).g, 0.01f * squared(radiance.g));
+}
+
+// A lamp with hardly any blue: red is clipped, blue is measured and must not be scaled with it.
+TEST(ClippedPart, HoldsTheChannelsThatAreLowerBounds)
+{
+    Bracket bracket = makeBracket({frameOf({255, 128}, 4.0), frameOf({255, 64}, 1.0)});
+    for (BracketFrame& frame : bracket.frames)
+        frame.image.codes(0, 0) = glm::u16vec3(255, 255, 40);
+    const MergeResult merged = mergeBracket(bracket, squares(), {});
+    const Image<Rgb> clipped = clippedPart(merged);
+    const Rgb radiance = merged.radiance.pixels(0, 0);
+    EXPECT_EQ(clipped(0, 0), Rgb(radiance.r, radiance.g, 0.0f));
+    EXPECT_EQ(clipped(1, 0), Rgb(0.0f));
+    EXPECT_TRUE(
+        clippedPart(mergeBracket(makeBracket({frameOf({128}, 1.0)}), squares(), {})).empty());
 }
 
 // The long frame's pixel beside a clipped one has rung (code 180 for 160); the short frame is good.

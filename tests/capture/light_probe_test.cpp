@@ -123,6 +123,35 @@ TEST(UnwrapMirrorBall, ConstantStaysConstantAndReflectanceIsDividedOut)
     }
 }
 
+// What is clipped goes where all light goes: both halves of the picture, unwrapped each by itself,
+// sum to the whole, reflectance and partly covered texels included.
+TEST(UnwrapMirrorBall, ClippedLightIsAPartOfAllLight)
+{
+    MirrorBall ball = ballAt(100.0);
+    ball.reflectance = 0.5;
+    const Camera camera = ballCamera(ball, kView, 300, 280);
+    const Image<Rgb> picture =
+        renderBall(ball, camera, [](glm::dvec3, glm::dvec3 d) { return colourOf(d); });
+    Image<Rgb> clipped = picture;
+    Image<Rgb> rest = picture;
+    for (std::size_t i = 0; i < picture.pixelCount(); ++i)
+        (picture.pixels()[i].g > 0.35f ? rest : clipped).pixels()[i] = Rgb(0.0f);
+    UnwrapOptions options;
+    options.width = 256;
+    const LightProbe other = unwrapMirrorBall(rest, ball, camera, options);
+    options.clipped = &clipped;
+    const LightProbe probe = unwrapMirrorBall(picture, ball, camera, options);
+    int partial = 0;
+    for (std::size_t i = 0; i < probe.environment.pixels.pixelCount(); ++i) {
+        const Rgb part = probe.environment.clipped.pixels()[i];
+        const Rgb measured = other.environment.pixels.pixels()[i];
+        const Rgb all = probe.environment.pixels.pixels()[i];
+        ASSERT_NEAR((part + measured).g, all.g, tolerance::kFloat * all.g);
+        partial += part.g > 0.0f && measured.g > 0.0f;
+    }
+    EXPECT_GT(partial, 100);
+}
+
 TEST(UnwrapMirrorBall, PutsFarThingsInTheirDirections)
 {
     const MirrorBall ball = ballAt(120.0);

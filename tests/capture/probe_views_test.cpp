@@ -103,6 +103,26 @@ TEST(MergeProbeViews, OneViewIsItsUnwrapping)
     EXPECT_LT(shareOff(merged.probe.environment, plain.environment), 0.002);
 }
 
+// The second view is twice as bright by mistake: what is clipped in it is scaled with it.
+TEST(MergeProbeViews, ClippedLightIsAPartOfAllLight)
+{
+    std::vector<ProbeView> views = {viewFrom(kFront, roomRadiance),
+                                    viewFrom(kSideways, roomRadiance)};
+    for (Rgb& pixel : views[1].radiance.pixels())
+        pixel *= 2.0f;
+    for (ProbeView& view : views) {
+        view.ball.reflectance = 0.8;
+        view.clipped = view.radiance;
+    }
+    MergeViewsOptions options = inTheRoom();
+    options.match_exposure = true;
+    const EnvironmentMap map = mergeProbeViews(views, options).probe.environment;
+    for (std::size_t i = 0; i < map.pixels.pixelCount(); ++i)
+        ASSERT_NEAR(map.clipped.pixels()[i].g,
+                    map.pixels.pixels()[i].g,
+                    tolerance::kFloat * map.pixels.pixels()[i].g);
+}
+
 TEST(MergeProbeViews, PhotographerAndBlindSpotVanish)
 {
     constexpr double kPerson = 0.25;  // radians

@@ -2,6 +2,7 @@
 
 #include "core/random.h"
 #include "lighting/sampling.h"
+#include "tests/support/form_factor.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -276,13 +277,13 @@ EnvironmentMap probeWithClippedSun(const SceneProxy& proxy, glm::dvec3 center, b
     const auto sun = [&](glm::dvec3 d) { return glm::dot(d, to_sun) > std::cos(0.03); };
     EnvironmentMap probe =
         environmentOf(256, [&](glm::dvec3 d) { return Rgb(sun(d) ? 20.0f : 1.0f); });
-    probe.clipped = Image<float>(512, 256);
+    probe.clipped = Image<Rgb>(512, 256);
     double irradiance = 0.0;
     for (int y = 0; y < 256; ++y)
         for (int x = 0; x < 512; ++x) {
             const glm::dvec3 d = environmentDirectionFromUv({(x + 0.5) / 512, (y + 0.5) / 256});
             if (!sun(d)) continue;
-            probe.clipped(x, y) = 1.0f;
+            probe.clipped(x, y) = probe.pixels(x, y);
             irradiance +=
                 kTimes * kSunRadiance * to_sun.y * environmentTexelSolidAngle(512, 256, y);
         }
@@ -330,6 +331,108 @@ TEST(RoomLight, AClippedSunWithoutAPatchKeepsItsBound)
     const RoomLight light(proxy, probe, center, std::nullopt, options, g_silent);
     EXPECT_TRUE(hasFinding(light.findings(), "light-clipped-unsolved"));
     EXPECT_NEAR(light.incident(center, to_sun).radiance.g, 20.0f, 1.0f);
+}
+
+/// A black room with a grey carpet below two lamps on the ceiling, one of them clipped, whose edges
+/// lie within texels. All light on it is known in closed form.
+struct LampRoom {
+    static constexpr double kBound = 2.0;
+    static constexpr double kLamp = 100.0;
+    static constexpr double kPanel = 3.0;
+    static constexpr double kHeight = 2.5;
+    glm::dvec3 center{0.3, 1.2, -0.4};
+    /// x and z of two corners.
+    glm::dvec4 lamp{-0.53, -0.72, 0.08, -0.11};
+    glm::dvec4 panel{0.6, -2.6, 1.8, 1.6};
+
+    [[nodiscard]] static double onFloor(const glm::dvec4& r, glm::dvec3 x, double radiance)
+    {
+        return form_factor::polygonIrradiance(
+            {{r.x, kHeight, r.y}, {r.z, kHeight, r.y}, {r.z, kHeight, r.w}, {r.x, kHeight, r.w}},
+            x,
+            {0, 1, 0},
+            radiance);
+    }
+    [[nodiscard]] static bool in(const glm::dvec4& r, glm::dvec3 p)
+    {
+        return p.y > kHeight - 1e-6 && p.x > r.x && p.x < r.z && p.z > r.y && p.z < r.w;
+    }
+    /// Grey up to two decimetres before the walls, which would take some of it from its texels.
+    [[nodiscard]] static bool carpet(glm::dvec3 p)
+    {
+        return std::abs(p.x) < 1.8 && p.z > -2.8 && p.z < 1.8;
+    }
+    [[nodiscard]] double lampOn(glm::dvec3 x) const { return onFloor(lamp, x, kLamp); }
+    /// What the probe sees, the lamp as kBound; texels are averages.
+    [[nodiscard]] EnvironmentMap probe(const SceneProxy& proxy) const
+    {
+        constexpr int kRows = 256;
+        constexpr int kGrid = 4;
+        EnvironmentMap map{Image<Rgb>(2 * kRows, kRows)};
+        map.clipped = map.pixels;
+        for (int y = 0; y < kRows * kGrid; ++y)
+            for (int x = 0; x < 2 * kRows * kGrid; ++x) {
+                const glm::dvec3 p =
+                    proxy
+                        .intersect(center,
+                                   environmentDirectionFromUv({(x + 0.5) / (2.0 * kRows * kGrid),
+                                                               (y + 0.5) / (kRows * kGrid)}))
+                        ->point;
+                double radiance = in(lamp, p) ? kBound : in(panel, p) ? kPanel : 0.0;
+                if (p.y < 1e-6 && carpet(p))
+                    radiance = 0.4 * (lampOn(p) + onFloor(panel, p, kPanel)) / pi;
+                const Rgb part(static_cast<float>(radiance / (kGrid * kGrid)));
+                map.pixels(x / kGrid, y / kGrid) += part;
+                if (in(lamp, p)) map.clipped(x / kGrid, y / kGrid) += part;
+            }
+        return map;
+    }
+    /// Irradiance of the floor at x from the ceiling, by quadrature.
+    [[nodiscard]] double ceilingOn(const RoomLight& light, glm::dvec3 x) const
+    {
+        constexpr double kStep = 0.01;
+        double sum = 0.0;
+        for (double px = -1.0; px < 0.5; px += kStep)
+            for (double pz = -1.2; pz < 0.4; pz += kStep) {
+                const glm::dvec3 way = glm::dvec3(px, kHeight, pz) - x;
+                const double d2 = glm::dot(way, way);
+                sum += light.incident(x, way / std::sqrt(d2)).radiance.g * way.y * way.y /
+                       (d2 * d2) * kStep * kStep;
+            }
+        return sum;
+    }
+};
+
+// Texels of 5 cm at the lamp's rim are covered in part: only that part is stronger than it looks.
+// The light of one place is given, so that nothing depends on how well the carpet tells it.
+TEST(RoomLight, AClippedLampIsSolvedWithItsRim)
+{
+    const LampRoom lamp;
+    const RoomDescription room = closedRoom();
+    const SceneProxy proxy(room);
+    RoomLightOptions options = coarse();
+    const glm::dvec3 at(0.4, 0.0, 0.3);
+    const double all = lamp.lampOn(at) + LampRoom::onFloor(lamp.panel, at, LampRoom::kPanel);
+    options.references = {
+        {.name = "the given irradiance", .places = {{at, {0, 1, 0}, glm::dvec3(all), 0.01}}}};
+    const RoomLight light(proxy, lamp.probe(proxy), lamp.center, std::nullopt, options, g_silent);
+    EXPECT_TRUE(hasFinding(light.findings(), "light-clipped-solved"));
+    for (const glm::dvec3& x : {glm::dvec3(0, 0, 0), glm::dvec3(-1.2, 0, -1.8)})
+        EXPECT_NEAR(lamp.ceilingOn(light, x) / lamp.lampOn(x), 1.0, 0.015);
+}
+
+// The same lamp by its light on the carpet. Its cells' irradiance scatters by 5 %, which leaves
+// about 3 % of the strength.
+TEST(RoomLight, ACarpetTellsHowStrongAClippedLampIs)
+{
+    const LampRoom lamp;
+    const RoomDescription room = closedRoom();
+    const SceneProxy proxy(room);
+    RoomLightOptions options = coarse();
+    options.cell_m = 0.2;
+    const RoomLight light(proxy, lamp.probe(proxy), lamp.center, std::nullopt, options, g_silent);
+    EXPECT_TRUE(hasFinding(light.findings(), "light-clipped-solved"));
+    EXPECT_NEAR(lamp.ceilingOn(light, {0, 0, 0}) / lamp.lampOn({0, 0, 0}), 1.0, 0.1);
 }
 
 TEST(RoomLight, OptionsWithoutMeaningAreRefused)

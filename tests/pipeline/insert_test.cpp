@@ -77,7 +77,8 @@ TEST(InsertObjects, SimulatedRoomComesCloseToTheTruePhotograph)
         if (result.composite.influence.pixels()[i] == 0) {
             ASSERT_EQ(made.codes.pixels()[i], plate.codes.pixels()[i]) << i;
         }
-    EXPECT_NEAR(result.light_to_photo, 1.0, 0.15);
+    EXPECT_NEAR(result.balance.luminance, 1.0, 0.15);
+    EXPECT_EQ(result.balance.used, glm::dvec3(1.0));
     EXPECT_FALSE(hasFinding(result.findings, "light-photo-mismatch"));
 }
 

@@ -492,23 +492,28 @@ TEST(ProjectSchema, NamesTheParsersKeys)
         };
     expectSame(schema, keys::kProject, "project");
     const Json& definitions = schema.at("$defs");
-    const std::pair<const char*, keys::KeyList> all[] = {{"image", keys::kImage},
-                                                         {"photo", keys::kPhoto},
-                                                         {"foreground", keys::kForeground},
-                                                         {"camera", keys::kCamera},
-                                                         {"light", keys::kLight},
-                                                         {"probe", keys::kProbe},
-                                                         {"probe_view", keys::kProbeView},
-                                                         {"ball", keys::kBall},
-                                                         {"view", keys::kView},
-                                                         {"floor", keys::kFloor},
-                                                         {"plane", keys::kPlane},
-                                                         {"box", keys::kBox},
-                                                         {"primitive", keys::kPrimitive},
-                                                         {"mesh", keys::kMesh},
-                                                         {"opening", keys::kOpening},
-                                                         {"object", keys::kObject},
-                                                         {"material", keys::kMaterial}};
+    const std::pair<const char*, keys::KeyList> all[] = {
+        {"image", keys::kImage},
+        {"photo", keys::kPhoto},
+        {"foreground", keys::kForeground},
+        {"camera", keys::kCamera},
+        {"light", keys::kLight},
+        {"probe", keys::kProbe},
+        {"probe_view", keys::kProbeView},
+        {"ball", keys::kBall},
+        {"view", keys::kView},
+        {"reference_card", keys::kReferenceCard},
+        {"reference_ball", keys::kReferenceBall},
+        {"reference_illuminance", keys::kReferenceIlluminance},
+        {"reference_irradiance", keys::kReferenceIrradiance},
+        {"floor", keys::kFloor},
+        {"plane", keys::kPlane},
+        {"box", keys::kBox},
+        {"primitive", keys::kPrimitive},
+        {"mesh", keys::kMesh},
+        {"opening", keys::kOpening},
+        {"object", keys::kObject},
+        {"material", keys::kMaterial}};
     for (const auto& [name, allowed] : all)
         expectSame(definitions.at(name), allowed, name);
 }

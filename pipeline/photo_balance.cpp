@@ -1,0 +1,215 @@
+#include "pipeline/photo_balance.h"
+
+#include "core/color.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+namespace insitu {
+
+namespace {
+
+constexpr std::size_t kMinPixels = 100;
+/// Pixels that are compared, about: enough for medians.
+constexpr double kPixels = 60000.0;
+/// Darker than this share of the clipping limit noise and black level matter.
+constexpr double kDark = 0.02;
+/// Colour is off when it differs by more than this, as a logarithm: rooms with equal balance show
+/// up to 3 % (docs/validation.md).
+constexpr double kColorOff = 0.05;
+constexpr double kColorSigmas = 3.0;
+/// A channel whose ratios scatter more than this tells nothing: it is black, or the room is wrong.
+constexpr double kUselessSpread = 0.4;
+const double kExposureOff = std::log(1.25);
+
+double quantile(std::vector<double>& values, double q)
+{
+    const auto at =
+        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+    std::ranges::nth_element(values, at);
+    return *at;
+}
+
+/// Logarithms of photograph / probe: red, green, blue, luminance.
+using Ratios = std::array<std::vector<double>, 4>;
+
+void addRatios(const Rgb& taken, const Rgb& seen, Ratios& ratios)
+{
+    for (int c = 0; c < 3; ++c)
+        if (taken[c] > 0.0f && seen[c] > 0.0f)
+            ratios[static_cast<std::size_t>(c)].push_back(
+                std::log(static_cast<double>(taken[c]) / static_cast<double>(seen[c])));
+    ratios[3].push_back(std::log(static_cast<double>(luminance(taken)) / luminance(seen)));
+}
+
+/// How far the faces' colours scatter about the whole's, weighted by how much is seen of each.
+double colorSigma(std::map<std::size_t, Ratios>& faces, std::size_t c, double whole)
+{
+    double total = 0.0;
+    double squares = 0.0;
+    for (auto& [face, ratios] : faces) {
+        if (ratios[c].size() < kMinPixels / 4 || ratios[3].size() < kMinPixels / 4) continue;
+        const double weight = static_cast<double>(ratios[c].size());
+        const double off = quantile(ratios[c], 0.5) - quantile(ratios[3], 0.5) - whole;
+        total += weight;
+        squares += weight * weight * off * off;
+    }
+    return total > 0.0 ? std::sqrt(squares) / total : 0.0;
+}
+
+std::string gainsText(glm::dvec3 gains)
+{
+    return fmt::format("{:.3f} (red), {:.3f} (green), {:.3f} (blue)", gains.r, gains.g, gains.b);
+}
+
+}  // namespace
+
+PhotoBalance measurePhotoBalance(const Image<Rgb>& radiance,
+                                 glm::dvec3 clip,
+                                 const Camera& camera,
+                                 const SceneProxy& proxy,
+                                 const EnvironmentMap& probe,
+                                 glm::dvec3 probe_center_m)
+{
+    const int stride = std::max(
+        1, static_cast<int>(std::sqrt(static_cast<double>(radiance.pixelCount()) / kPixels)));
+    Ratios all;
+    std::map<std::size_t, Ratios> faces;
+    for (int y = stride / 2; y < radiance.height(); y += stride)
+        for (int x = stride / 2; x < radiance.width(); x += stride) {
+            const Rgb taken = radiance(x, y);
+            const glm::dvec3 share = glm::dvec3(taken) / clip;
+            const double brightest = std::max({share.r, share.g, share.b});
+            if (!(brightest < 0.95 && brightest > kDark)) continue;
+            const auto hit =
+                proxy.intersect(camera.position_m, camera.rayDirection({x + 0.5, y + 0.5}));
+            if (!hit || hit->opening || proxy.faces()[hit->face].solid) continue;
+            const glm::dvec3 way = hit->point - probe_center_m;
+            const ProxyFace& face = proxy.faces()[hit->face];
+            if ((!face.two_sided && glm::dot(way, face.normal) >= 0.0) ||
+                !proxy.mutuallyVisible(probe_center_m, hit->point))
+                continue;
+            const glm::dvec3 direction = glm::normalize(way);
+            const Rgb seen = lookUp(probe, direction);
+            if (!(luminance(seen) > 0.0f) || lookUpClipped(probe, direction) != Rgb(0.0f)) continue;
+            addRatios(taken, seen, all);
+            addRatios(taken, seen, faces[hit->face]);
+        }
+    PhotoBalance balance;
+    if (all[3].size() < kMinPixels) return balance;
+    balance.pixels = all[3].size();
+    balance.luminance = std::exp(quantile(all[3], 0.5));
+    balance.luminance_spread = 0.5 * (quantile(all[3], 0.75) - quantile(all[3], 0.25));
+    for (int c = 0; c < 3; ++c) {
+        std::vector<double>& list = all[static_cast<std::size_t>(c)];
+        balance.measured[c] = balance.luminance;
+        balance.spread[c] = kUselessSpread;
+        if (2 * list.size() < balance.pixels) continue;  // mostly black
+        balance.measured[c] = std::exp(quantile(list, 0.5));
+        balance.spread[c] = 0.5 * (quantile(list, 0.75) - quantile(list, 0.25));
+        balance.color_sigma[c] = colorSigma(
+            faces, static_cast<std::size_t>(c), std::log(balance.measured[c] / balance.luminance));
+    }
+    return balance;
+}
+
+void choosePhotoBalance(const ProjectWhiteBalance& wanted, bool unit_known, PhotoBalance& balance)
+{
+    using Mode = ProjectWhiteBalance::Mode;
+    balance.used = glm::dvec3(1.0);
+    const bool known = balance.pixels > 0;
+    if (wanted.mode == Mode::Given) {
+        balance.used = wanted.gains;
+        return;
+    }
+    if (!known) {
+        if (wanted.mode == Mode::Solved)
+            balance.findings.push_back(
+                {Severity::Warning,
+                 "photo-white-balance-doubtful",
+                 "photograph and light probe see no surface in common: exposure and white "
+                 "balance cannot be solved; give \"white_balance\" as three numbers"});
+        return;
+    }
+    // Exposure.
+    const double off = std::log(balance.luminance);
+    if (!unit_known || wanted.mode == Mode::Solved) {
+        balance.used = glm::dvec3(balance.luminance);
+        if (!unit_known)
+            balance.findings.push_back(
+                {Severity::Info,
+                 "light-scale-from-photograph",
+                 fmt::format("the light's exposure is unknown; scaled by {:.4g} so that surfaces "
+                             "seen by both agree (spread {:.0f} %)",
+                             balance.luminance,
+                             100.0 * balance.luminance_spread)});
+    } else if (std::abs(off) > kExposureOff) {
+        balance.findings.push_back(
+            {Severity::Warning,
+             "light-photo-mismatch",
+             fmt::format("surfaces seen by both are {:.2f} times as bright in the light probe as "
+                         "in the photograph (spread {:.0f} %): check the exposures, the ball's "
+                         "reflectance and the room's dimensions",
+                         1.0 / balance.luminance,
+                         100.0 * balance.luminance_spread)});
+    }
+    if (wanted.mode == Mode::None) return;
+
+    // White balance: channels that tell.
+    glm::dvec3 color(1.0);
+    bool is_off = wanted.mode == Mode::Solved;
+    bool doubtful = false;
+    for (int c = 0; c < 3; ++c) {
+        if (balance.spread[c] >= kUselessSpread) continue;
+        color[c] = balance.measured[c] / balance.luminance;
+        const double log_color = std::abs(std::log(color[c]));
+        if (log_color <= kColorOff) continue;
+        if (log_color > kColorSigmas * balance.color_sigma[c])
+            is_off = true;
+        else
+            doubtful = true;
+    }
+    if (is_off) {
+        balance.used *= color;
+        balance.findings.push_back(
+            {Severity::Info,
+             "photo-white-balance-solved",
+             fmt::format(
+                 "the photograph's white balance is not the probe's: it has {} times its "
+                 "light, by {} pixels that both see (spread {:.0f} %), and so has all "
+                 "light that is put into it",
+                 gainsText(balance.used),
+                 balance.pixels,
+                 100.0 * std::max({balance.spread.r, balance.spread.g, balance.spread.b}))});
+    } else if (doubtful) {
+        balance.findings.push_back(
+            {Severity::Warning,
+             "photo-white-balance-doubtful",
+             fmt::format("surfaces seen by both have {} times the probe's light in the "
+                         "photograph, but disagree too much to tell a tint from wrong "
+                         "dimensions: nothing is changed; \"white_balance\": \"solved\" takes it",
+                         gainsText(balance.measured))});
+    }
+}
+
+void scaleLight(RenderLayers& layers, glm::dvec3 gains)
+{
+    if (gains == glm::dvec3(1.0)) return;
+    const Rgb scale(gains);
+    for (auto* image : {&layers.object,
+                        &layers.irradiance_with,
+                        &layers.irradiance_without,
+                        &layers.probe_radiance})
+        for (Rgb& value : image->pixels())
+            value *= scale;
+    const float brightness = luminance(scale);
+    for (float& value : layers.object_variance.pixels())
+        value *= brightness * brightness;
+}
+
+}  // namespace insitu
