@@ -29,11 +29,17 @@ double cornerSolidAngle(double x, double y)
 
 glm::dvec3 DirectionCells::direction(std::size_t pair) const
 {
-    const Texel texel = texelOf(pair, face_size);
+    return directionIn(2 * pair, glm::dvec2(0.5));
+}
+
+glm::dvec3 DirectionCells::directionIn(std::size_t cell, glm::dvec2 inside) const
+{
+    const Texel texel = texelOf(cell / 2, face_size);
+    const double side = cell % 2 == 0 ? 1.0 : -1.0;
     glm::dvec3 d(0.0);
-    d[texel.axis] = 1.0;
-    d[(texel.axis + 1) % 3] = 2.0 * (texel.column + 0.5) / face_size - 1.0;
-    d[(texel.axis + 2) % 3] = 2.0 * (texel.row + 0.5) / face_size - 1.0;
+    d[texel.axis] = side;
+    d[(texel.axis + 1) % 3] = side * (2.0 * (texel.column + inside.x) / face_size - 1.0);
+    d[(texel.axis + 2) % 3] = side * (2.0 * (texel.row + inside.y) / face_size - 1.0);
     return glm::normalize(d);
 }
 

@@ -27,6 +27,16 @@ struct DirectionCells {
     }
     /// Unit direction through the centre of the cell of side 0.
     [[nodiscard]] glm::dvec3 direction(std::size_t pair) const;
+    /// Unit direction through a point of a cell, `inside` in [0, 1]², along column and row. Cells
+    /// of both sides are numbered 2·pair + side.
+    [[nodiscard]] glm::dvec3 directionIn(std::size_t cell, glm::dvec2 inside) const;
+    /// One of rays_along² directions spread evenly over a cell.
+    [[nodiscard]] glm::dvec3 directionOfRay(std::size_t cell, int ray, int rays_along) const
+    {
+        return directionIn(cell,
+                           (glm::dvec2(ray % rays_along, ray / rays_along) + 0.5) /
+                               static_cast<double>(rays_along));
+    }
     /// Exact solid angle of either cell of the pair; all of them sum to 4π.
     [[nodiscard]] double solidAngle(std::size_t pair) const;
     /// The cell that a direction of any length > 0 falls into.

@@ -2,6 +2,7 @@
 
 #include "lighting/cell_light.h"
 #include "lighting/fiv_kernel.h"
+#include "lighting/hidden_light.h"
 
 #include <glm/glm.hpp>
 
@@ -17,6 +18,11 @@ namespace insitu::fiv {
                               Sum sum,
                               glm::vec3 normal);
 
+/// The same for Sum::Radiance.
+[[nodiscard]] Source sourceOf(const SilhouetteSet& set, const CellRadiance& light);
+/// The same for four lights at once, Sum::Corners.
+[[nodiscard]] Source sourceOfCorners(const SilhouetteSet& set, const CornerIrradiance& light);
+
 /// Fills a block with the places (and normals, if any) from `begin` on, and the ball around it;
 /// sums become 0. Places that are not finite are a LogicError.
 void fillBlock(Group& group,
@@ -26,10 +32,10 @@ void fillBlock(Group& group,
                std::size_t begin);
 
 /// What a block's sums are, by Sum.
-[[nodiscard]] inline Rgb irradianceOf(const Block& block, std::size_t i)
+[[nodiscard]] inline Rgb irradianceOf(const Block& block, std::size_t i, std::size_t first = 0)
 {
-    const auto sum = [&](int k) { return block.sums[k][i] + block.uniform[k]; };
-    return {sum(0), sum(1), sum(2)};
+    const auto sum = [&](std::size_t k) { return block.sums[k][i] + block.uniform[k]; };
+    return {sum(first), sum(first + 1), sum(first + 2)};
 }
 [[nodiscard]] inline IrradianceVector vectorOf(const Block& block, std::size_t i)
 {

@@ -11,7 +11,7 @@ namespace {
 template <Sum kSum>
 INSITU_KERNEL void accumulateAll(const float* flux, Projected& p, Block& block)
 {
-    if constexpr (kSum == Sum::PerPlace) {
+    if constexpr (kSum == Sum::PerPlace || kSum == Sum::Radiance) {
         for (int i = 0; i < kSize; ++i)
             p.along[i] = 1.0f;
         accumulate<kSum>(p.along, flux, block);
@@ -157,6 +157,10 @@ INSITU_KERNEL void sumAny(Sum sum, const Job& job)
             return sumJob<Sum::Irradiance>(job);
         case Sum::PerPlace:
             return sumJob<Sum::PerPlace>(job);
+        case Sum::Radiance:
+            return sumJob<Sum::Radiance>(job);
+        case Sum::Corners:
+            return sumJob<Sum::Corners>(job);
     }
 }
 

@@ -18,8 +18,8 @@ struct Block {
 
     alignas(64) Row x, y, z;     ///< local places; unused ones repeat the last
     alignas(64) Row nx, ny, nz;  ///< normals, where they are asked for
-    alignas(64) Row sums[9];     ///< what comes out, channel by channel
-    float uniform[9];            ///< the same for all places, to be added to the sums
+    alignas(64) Row sums[12];    ///< what comes out, channel by channel
+    float uniform[12];           ///< the same for all places, to be added to the sums
 };
 /// Blocks that are summed together: their sums stay in the second cache, a silhouette in the first.
 struct Group {
@@ -27,6 +27,11 @@ struct Group {
 
     Block blocks[kBlocks];
     int count = 0;
+    /// Blocks that must hold places: whole vectors of any instruction set.
+    [[nodiscard]] std::size_t filled() const
+    {
+        return (static_cast<std::size_t>(count) + 15) / 16 * 16;
+    }
     /// Balls around the places of each block; all of them beyond `count` are as the last.
     alignas(64) float x[kBlocks], y[kBlocks], z[kBlocks], radius[kBlocks];
 };
@@ -36,10 +41,23 @@ enum class Sum {
     Vectors,     ///< its irradiance vector: 9 sums, flux of 9 numbers a direction
     Irradiance,  ///< irradiance of one common normal: 3 sums, flux of 3 numbers a direction
     PerPlace,    ///< max(0, N·vector) with each place's own normal: 3 sums, flux of 9 numbers
+    Radiance,  ///< max(0, N·ω) radiance, each place's own normal: 3 sums, flux of ω and radiance
+    Corners,   ///< irradiance of one common normal in four lights: 12 sums, flux of 12 numbers
 };
 [[nodiscard]] constexpr int fluxNumbers(Sum sum)
 {
-    return sum == Sum::Irradiance ? 3 : 9;
+    switch (sum) {
+        case Sum::Irradiance:
+            return 3;
+        case Sum::Radiance:
+            return 6;
+        case Sum::Corners:
+            return 12;
+        case Sum::Vectors:
+        case Sum::PerPlace:
+            break;
+    }
+    return 9;
 }
 
 /// A set of silhouettes with the light of ω and −ω of each, `fluxNumbers` a direction.

@@ -102,7 +102,8 @@ INSITU_KERNEL void concerns(const Look& look,
                             Concerns& found)
 {
     const SilhouetteFrame& f = look.frame;
-    for (int b = 0; b < Group::kBlocks; ++b) {
+    const int blocks = static_cast<int>(group.filled());
+    for (int b = 0; b < blocks; ++b) {
         const float x = group.x[b];
         const float y = group.y[b];
         const float z = group.z[b];
@@ -250,6 +251,15 @@ INSITU_KERNEL void accumulate(const float* share, const float* flux, Block& bloc
                     vector[0] * block.nx[i] + vector[1] * block.ny[i] + vector[2] * block.nz[i];
                 block.sums[c][i] += share[i] * (cosine > 0.0f ? cosine : 0.0f);
             }
+        }
+    } else if constexpr (kSum == Sum::Radiance) {
+        for (int i = 0; i < kSize; ++i) {
+            const float cosine =
+                flux[0] * block.nx[i] + flux[1] * block.ny[i] + flux[2] * block.nz[i];
+            const float weight = share[i] * (cosine > 0.0f ? cosine : 0.0f);
+            block.sums[0][i] += weight * flux[3];
+            block.sums[1][i] += weight * flux[4];
+            block.sums[2][i] += weight * flux[5];
         }
     } else {
         for (int k = 0; k < fluxNumbers(kSum); ++k) {

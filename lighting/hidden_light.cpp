@@ -42,13 +42,23 @@ void sumHidden(const std::vector<Source>& sources,
         const std::size_t end = std::min(begin + kPlaces, places.size());
         const auto group = std::make_unique<Group>();
         group->count = static_cast<int>((end - begin + Block::kSize - 1) / Block::kSize);
-        for (std::size_t b = 0; b < Group::kBlocks; ++b)
+        for (std::size_t b = 0; b < group->filled(); ++b)
             fiv::fillBlock(*group, b, places, normals, begin + b * Block::kSize);
         for (const Source& source : sources)
             fiv::addHidden(bestInstructionSet(), sum, source, bias_texels, *group);
         for (std::size_t i = begin; i < end; ++i)
             take(group->blocks[(i - begin) / Block::kSize], i, (i - begin) % Block::kSize);
     });
+}
+
+template <class Light>
+void checkLight(const Light& light, const VisibilityAtlas& atlas)
+{
+    INSITU_CHECK(light.along.size() == atlas.cells().pairCount() &&
+                     light.against.size() == light.along.size(),
+                 "light of {} pairs for an atlas of {}",
+                 light.along.size(),
+                 atlas.cells().pairCount());
 }
 
 }  // namespace
@@ -141,6 +151,55 @@ void hiddenIrradiance(const ObjectLight& object,
               bias_texels,
               [&](const Block& block, std::size_t place, std::size_t i) {
                   hidden[place] = fiv::irradianceOf(block, i);
+              });
+}
+
+void hiddenIrradiance(const VisibilityAtlas& atlas,
+                      const CellRadiance& light,
+                      std::span<const glm::vec3> places,
+                      std::span<const glm::vec3> unit_normals,
+                      std::span<Rgb> hidden,
+                      float bias_texels)
+{
+    INSITU_CHECK(places.size() == hidden.size() && places.size() == unit_normals.size(),
+                 "{} and {} for {}",
+                 hidden.size(),
+                 unit_normals.size(),
+                 places.size());
+    checkLight(light, atlas);
+    sumHidden({fiv::sourceOf(atlas.silhouettes, light)},
+              Sum::Radiance,
+              places,
+              unit_normals,
+              bias_texels,
+              [&](const Block& block, std::size_t place, std::size_t i) {
+                  hidden[place] = fiv::irradianceOf(block, i);
+              });
+}
+
+void hiddenIrradiance(const VisibilityAtlas& atlas,
+                      const CornerIrradiance& light,
+                      std::span<const glm::vec3> places,
+                      std::span<const std::array<float, 4>> weights,
+                      std::span<Rgb> hidden,
+                      float bias_texels)
+{
+    INSITU_CHECK(places.size() == hidden.size() && places.size() == weights.size(),
+                 "{} and {} for {}",
+                 hidden.size(),
+                 weights.size(),
+                 places.size());
+    checkLight(light, atlas);
+    sumHidden({fiv::sourceOfCorners(atlas.silhouettes, light)},
+              Sum::Corners,
+              places,
+              {},
+              bias_texels,
+              [&](const Block& block, std::size_t place, std::size_t i) {
+                  hidden[place] = Rgb(0.0f);
+                  for (std::size_t corner = 0; corner < 4; ++corner)
+                      hidden[place] +=
+                          weights[place][corner] * fiv::irradianceOf(block, i, 3 * corner);
               });
 }
 

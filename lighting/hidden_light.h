@@ -5,7 +5,9 @@
 
 #include <glm/glm.hpp>
 
+#include <array>
 #include <span>
+#include <vector>
 
 namespace insitu {
 
@@ -60,6 +62,35 @@ void hiddenIrradiance(const ObjectLight& object,
 void hiddenIrradiance(const ObjectLight& object,
                       std::span<const glm::vec3> places_local,
                       glm::vec3 unit_normal,
+                      std::span<Rgb> hidden,
+                      float bias_texels = 0.0f);
+
+/// Radiance of an atlas's cells times their solid angles, one a pair; each shines from its centre.
+/// Negative where what hides is brighter than what it hides.
+struct CellRadiance {
+    std::vector<Rgb> along, against;
+};
+void hiddenIrradiance(const VisibilityAtlas& atlas,
+                      const CellRadiance& light,
+                      std::span<const glm::vec3> places_local,
+                      std::span<const glm::vec3> unit_normals,
+                      std::span<Rgb> hidden,
+                      float bias_texels = 0.0f);
+
+/// Irradiance that the cells of an atlas give surfaces of one normal, in four lights at once: those
+/// seen from the corners of a square of receivers, in which light is bilinear.
+struct CornerIrradiance {
+    using Corners = std::array<Rgb, 4>;
+    /// Of the cells of side 0 and of side 1, one a pair; 0 below the horizon. Negative where what
+    /// hides is brighter than what it hides.
+    std::vector<Corners> along, against;
+};
+/// Irradiance of the hidden light, the corners mixed by each place's weights. What a place does not
+/// see is the same for all four, so this costs little more than one of them.
+void hiddenIrradiance(const VisibilityAtlas& atlas,
+                      const CornerIrradiance& light,
+                      std::span<const glm::vec3> places_local,
+                      std::span<const std::array<float, 4>> weights,
                       std::span<Rgb> hidden,
                       float bias_texels = 0.0f);
 

@@ -17,10 +17,7 @@ CellGeometry::CellGeometry(DirectionCells cells_of) : cells(cells_of)
 void PlaceLight::setChange(const FaceGrid<Rgb>& room_change)
 {
     for (std::size_t cell = 0; cell < ends.size(); ++cell)
-        change[cell] =
-            ends[cell].face >= End::kNotLooked
-                ? Rgb(0.0f)
-                : room_change.lookUp(ends[cell].face, glm::dvec2(ends[cell].uv), Rgb(0.0f));
+        change[cell] = ends[cell].lookUp(room_change);
 }
 
 std::pair<Rgb, Rgb> PlaceLight::irradiance(glm::vec3 unit_normal) const
@@ -36,11 +33,17 @@ std::pair<Rgb, Rgb> PlaceLight::irradiance(glm::vec3 unit_normal) const
     return {Rgb(without), Rgb(changed)};
 }
 
+PlaceLight::End endOf(const RoomLight::Arrival& arrival)
+{
+    if (!arrival.hit || arrival.hit->opening) return {PlaceLight::End::kNoFace, {}};
+    return {static_cast<std::uint32_t>(arrival.hit->face), glm::vec2(arrival.hit->uv)};
+}
+
 PlaceLight lookAround(const RoomLight& room,
                       const LightSpots& spots,
                       glm::dvec3 place,
                       std::shared_ptr<const CellGeometry> geometry,
-                      const std::optional<glm::vec3>& horizon_normal)
+                      const LookOptions& options)
 {
     const std::vector<ProxyFace>& faces = room.proxy().faces();
     const std::size_t count = geometry->directions.size();
@@ -51,20 +54,22 @@ PlaceLight lookAround(const RoomLight& room,
                      0.0};
     std::size_t looked = 0;
     std::size_t behind = 0;
+    const int rays = options.rays_along * options.rays_along;
     for (std::size_t cell = 0; cell < count; ++cell) {
-        const glm::vec3 toward = light.geometry->directions[cell];
-        if (horizon_normal && glm::dot(toward, *horizon_normal) <= 0.0f) continue;
-        const glm::dvec3 direction = glm::normalize(glm::dvec3(toward));
-        const RoomLight::Arrival arrival = room.arrive(place, direction);
-        ++looked;
-        if (!spots.holds(arrival, direction)) light.radiance[cell] = arrival.light.radiance;
-        light.ends[cell].face = PlaceLight::End::kNoFace;
-        if (!arrival.hit || arrival.hit->opening) continue;
-        light.ends[cell] = {static_cast<std::uint32_t>(arrival.hit->face),
-                            glm::vec2(arrival.hit->uv)};
-        if (!faces[arrival.hit->face].two_sided &&
-            glm::dot(faces[arrival.hit->face].normal, direction) > 0.0)
-            ++behind;
+        if (!options.hold(light.geometry->directions[cell])) continue;
+        for (int ray = 0; ray < rays; ++ray) {
+            const glm::dvec3 direction =
+                light.geometry->cells.directionOfRay(cell, ray, options.rays_along);
+            const RoomLight::Arrival arrival = room.arrive(place, direction);
+            ++looked;
+            if (!spots.holds(arrival, direction))
+                light.radiance[cell] += arrival.light.radiance / static_cast<float>(rays);
+            light.ends[cell] = endOf(arrival);
+            if (light.ends[cell].face == PlaceLight::End::kNoFace) continue;
+            if (!faces[arrival.hit->face].two_sided &&
+                glm::dot(faces[arrival.hit->face].normal, direction) > 0.0)
+                ++behind;
+        }
     }
     if (looked > 0) light.inside_share = static_cast<double>(behind) / static_cast<double>(looked);
     return light;

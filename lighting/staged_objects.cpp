@@ -113,7 +113,7 @@ void ObjectStage::Impl::sum(Sum kind,
             for (std::size_t i = 0; i < count; ++i)
                 local[i] = localFrom(objects[k], places[begin + i]);
             groups[k].count = static_cast<int>((count + Block::kSize - 1) / Block::kSize);
-            for (std::size_t b = 0; b < Group::kBlocks; ++b)
+            for (std::size_t b = 0; b < groups[k].filled(); ++b)
                 fiv::fillBlock(groups[k], b, local, own_normals, b * Block::kSize);
         }
         fiv::addHiddenByAny(bestInstructionSet(), kind, of_cells, cells, bias, groups);

@@ -99,6 +99,7 @@ FivScene makeScene(const RoomLight& room,
 /// mean radiance, twice, then the room's change, then the objects again in the changed room.
 void lightEachOther(FivScene& scene,
                     ObjectShading& shading,
+                    ReceiverLight& receivers,
                     const FivOptions& fiv,
                     Progress& progress)
 {
@@ -108,12 +109,13 @@ void lightEachOther(FivScene& scene,
         places.push_back(
             {sample.point.position, sample.point.geometric_normal, sample.point.geometric_normal});
     for (int round = 0; round < 3; ++round) {
-        if (round == 2) scene.room_change = roomChange(scene);
+        if (round == 2) scene.room_change = roomChange(scene, receivers);
         if (round > 0) shading.update(/*room_too=*/round == 2);
         scene.glow = glowOf(scene, samples, shading.receive(places));
         progress.checkpoint();
     }
     shading.update(/*room_too=*/false);
+    receivers.update();
 }
 
 /// Nothing stands in the room: with is without.
@@ -158,12 +160,12 @@ InsertionResult renderFiv(const Camera& camera,
     const FivOptions& fiv = options.fiv;
     FivScene scene = makeScene(room, objects, fiv, result, progress);
     ObjectShading shading(scene, {fiv.object_node_spacing_m, fiv.bias_texels});
-    if (fiv.interreflection) lightEachOther(scene, shading, fiv, progress);
+    ReceiverLight light(scene, fiv.receiver_node_spacing_m);
+    if (fiv.interreflection) lightEachOther(scene, shading, light, fiv, progress);
     progress.report("fiv", 0.3);
 
     const auto receivers = renderObjectPixels(camera, scene, shading, result.layers, progress);
     progress.report("fiv", 0.6);
-    ReceiverLight light(scene, fiv.receiver_node_spacing_m);
     result.mean_samples = renderReceiverPixels(
         scene, receivers, light, fiv.interpolation_tolerance, result.layers, progress);
     progress.report("fiv", 1.0);

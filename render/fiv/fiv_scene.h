@@ -34,6 +34,18 @@ struct FivScene {
         const DirectedPair cell = coarse.cells().cellAt(direction);
         return glow[2 * cell.pair + static_cast<std::size_t>(cell.side)];
     }
+    /// The cells of one of the scene's atlases that the objects might hide from any place within
+    /// `reach_m` of this one.
+    [[nodiscard]] LookOptions limitsTowardObjects(glm::dvec3 place,
+                                                  double reach_m,
+                                                  const VisibilityAtlas& of) const;
+    /// How far the objects' box lies ahead at least, for rays along this unit direction that pass
+    /// anywhere through it; negative when it reaches behind the place.
+    [[nodiscard]] double distanceToObjects(glm::dvec3 place, glm::dvec3 direction) const
+    {
+        return glm::dot(frame().center - place, direction) -
+               frame().radius * glm::dot(glm::dvec3(frame().half_extent), glm::abs(direction));
+    }
     /// False when nothing on the ray can be an object.
     [[nodiscard]] bool mayMeetObjects(glm::dvec3 origin, glm::dvec3 direction) const
     {
@@ -45,20 +57,8 @@ struct FivScene {
     }
 };
 
-/// The light at a place less the objects' own, as light that objects can hide: what they take from
-/// a surface when they hide it. Where they are brighter than what they hide, it is in `gained`.
-struct HideableLight {
-    ObjectLight lost;
-    ObjectLight gained;
-    bool gains = false;
-};
-/// `light` has the cells of `atlas`, which is one of the scene's.
-[[nodiscard]] HideableLight hideableLight(const FivScene& scene,
-                                          const VisibilityAtlas& atlas,
-                                          const PlaceLight& light);
-
-/// What the objects change of the room's own radiance: ρ/π times the change of irradiance that
-/// they cause directly, on the room's cell grid. One round; uses scene.glow.
-[[nodiscard]] FaceGrid<Rgb> roomChange(const FivScene& scene);
+/// The light at a place less the objects' own: what they take from a surface when they hide it.
+/// `light` has the cells of the scene's coarse atlas.
+[[nodiscard]] CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light);
 
 }  // namespace insitu

@@ -103,7 +103,7 @@ void ObjectShading::update(bool room_too)
             });
         }
     }
-    hideable_ = hideableLight(scene_, scene_.coarse, mean_);
+    hideable_ = hideableLight(scene_, mean_);
 }
 
 void ObjectShading::lookFromNodes(double spacing_m)
@@ -199,18 +199,15 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
         normals[i] = glm::vec3(places[i].normal);
     }
     std::vector<Rgb> lost(places.size(), Rgb(0.0f));
-    std::vector<Rgb> gained(places.size(), Rgb(0.0f));
-    const bool hides = scene_.light != FivLight::Cube;
-    if (hides) hiddenIrradiance(hideable_.lost, local, normals, lost, options_.bias_texels);
-    if (hides && hideable_.gains)
-        hiddenIrradiance(hideable_.gained, local, normals, gained, options_.bias_texels);
+    if (scene_.light != FivLight::Cube)
+        hiddenIrradiance(scene_.coarse, hideable_, local, normals, lost, options_.bias_texels);
     std::vector<Received> result(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         const Rgb all = mean_irradiance_.lookUp(places[i].normal);
-        const Rgb left = glm::max(all - lost[i] + gained[i], Rgb(0.0f));
+        const Rgb left = glm::max(all - lost[i], Rgb(0.0f));
         const Rgb open = openIrradiance(places[i]);
         Received& r = result[i];
-        // Where the mean light brings nothing, what was gained is all there is.
+        // Where the mean light brings nothing, what objects send is all there is.
         for (int c = 0; c < 3; ++c)
             r.smooth[c] = all[c] > 0.0f ? open[c] * std::min(left[c] / all[c], kMostGain) : left[c];
         const float level = luminance(all);

@@ -62,7 +62,7 @@ private:
     bool any_glossy_ = false;
     PlaceLight mean_;
     DirectionTable mean_irradiance_;
-    HideableLight hideable_;
+    CellRadiance hideable_;
     std::vector<DirectionTable> glossy_;  ///< of evenly spaced roughnesses, the last is 1
 };
 

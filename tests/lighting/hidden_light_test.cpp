@@ -177,6 +177,92 @@ TEST(HiddenLight, IsLinearInTheLight)
     }
 }
 
+/// Random radiance times solid angle of every cell of an atlas, some of it negative.
+CellRadiance randomCells(const VisibilityAtlas& atlas, std::uint64_t seed)
+{
+    CellRadiance cells;
+    for (std::size_t i = 0; i < atlas.cells().pairCount(); ++i) {
+        RandomStream random(seed, i, 0);
+        const auto value = [&] { return 0.01f * (random.uniform() - 0.3f); };
+        cells.along.emplace_back(value(), value(), value());
+        cells.against.emplace_back(value(), i % 3 == 0 ? 0.0f : value(), value());
+    }
+    return cells;
+}
+
+/// As hiddenShares() defines it, cell by cell.
+Rgb hiddenOneByOne(const VisibilityAtlas& atlas,
+                   const CellRadiance& light,
+                   glm::vec3 place,
+                   glm::vec3 normal,
+                   float bias)
+{
+    glm::dvec3 sum(0.0);
+    for (std::size_t i = 0; i < light.along.size(); ++i) {
+        const HiddenShares shares = hiddenShares(atlas.silhouettes, i, place, bias);
+        const float cosine = glm::dot(glm::vec3(atlas.silhouettes.directions[i]), normal);
+        sum += glm::dvec3(light.along[i] * shares.along * std::max(0.0f, cosine));
+        sum += glm::dvec3(light.against[i] * shares.against * std::max(0.0f, -cosine));
+    }
+    return Rgb(sum);
+}
+
+TEST(HiddenLight, RadianceOfCellsMeetsEachPlacesNormal)
+{
+    const TriangleMesh mesh = shapes::table();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, kSmall, silent);
+    const CellRadiance light = randomCells(atlas, 5);
+    std::vector<glm::vec3> places = placesAround(0.5, 40);
+    for (const glm::vec3& p : placesAround(1.4, 40))
+        places.push_back(p);
+    std::vector<glm::vec3> normals;
+    for (const glm::vec3& p : places)
+        normals.push_back(glm::normalize(glm::vec3(0.3f - p.y, 0.5f + p.x, -p.z)));
+    std::vector<Rgb> hidden(places.size());
+    hiddenIrradiance(atlas, light, places, normals, hidden, 0.5f);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        const Rgb expected = hiddenOneByOne(atlas, light, places[i], normals[i], 0.5f);
+        EXPECT_LT(glm::length(hidden[i] - expected), 2e-5) << i;
+    }
+}
+
+TEST(HiddenLight, FourLightsAtOnceAreTheirMix)
+{
+    const TriangleMesh mesh = shapes::chair();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, kSmall, silent);
+    const glm::vec3 up(0.0f, 1.0f, 0.0f);
+    CornerIrradiance corners;
+    corners.along.resize(atlas.cells().pairCount());
+    corners.against.resize(atlas.cells().pairCount());
+    std::vector<CellRadiance> lights;
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+        lights.push_back(randomCells(atlas, 7 + corner));
+        for (std::size_t i = 0; i < corners.along.size(); ++i) {
+            const float cosine = static_cast<float>(atlas.silhouettes.directions[i].y);
+            corners.along[i][corner] = std::max(0.0f, cosine) * lights[corner].along[i];
+            corners.against[i][corner] = std::max(0.0f, -cosine) * lights[corner].against[i];
+        }
+    }
+    const std::vector<glm::vec3> places = placesAround(0.9, 100);
+    std::vector<std::array<float, 4>> weights;
+    for (std::size_t i = 0; i < places.size(); ++i)
+        weights.push_back({0.1f, 0.2f, 0.3f, 0.01f * static_cast<float>(i)});
+    std::vector<Rgb> hidden(places.size());
+    hiddenIrradiance(atlas, corners, places, weights, hidden);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        Rgb expected(0.0f);
+        for (std::size_t corner = 0; corner < 4; ++corner)
+            expected +=
+                weights[i][corner] * hiddenOneByOne(atlas, lights[corner], places[i], up, 0.0f);
+        EXPECT_LT(glm::length(hidden[i] - expected), 2e-5) << i;
+    }
+    weights.pop_back();
+    EXPECT_THROW(hiddenIrradiance(atlas, corners, places, weights, hidden), LogicError);
+    corners.along.pop_back();
+    weights.push_back({});
+    EXPECT_THROW(hiddenIrradiance(atlas, corners, places, weights, hidden), LogicError);
+}
+
 TEST(HiddenLight, TurningTheObjectIsTurningTheLightBack)
 {
     const TriangleMesh mesh = shapes::table();

@@ -293,6 +293,23 @@ TEST(RenderFiv, WhatIsFarFromTheObjectsStaysAsItIs)
     EXPECT_GT(layers.irradiance_without(24, 24).g, 3.0f);
 }
 
+// A partition of the room stands between the ball and the half that the camera sees.
+TEST(RenderFiv, FurnitureHidesObjectsFromReceivers)
+{
+    RoomDescription room = closedRoom();
+    room.boxes.push_back({{-0.9, 0.0, -3.0}, {-0.8, 2.5, 2.0}, true, ""});
+    const SceneProxy proxy(room);
+    const RoomLight light = lightOf(proxy, uniform(1.0f));
+    const ObjectScene ball = balls({{{0.4f, 0.5f, 0.0f}, 0.5f}}, 0.1f);
+    const Camera camera = Camera::lookAt({-1.0, 1.0, 0.0}, {-2.0, 0.8, 0.0}, 70.0, 24, 18);
+    InsertionOptions options = fiv();
+    // The room's cells are coarser than the partition is thick.
+    options.fiv.interreflection = false;
+    const RenderLayers layers = renderInsertion(camera, light, ball, options, g_silent).layers;
+    EXPECT_EQ(layers.irradiance_with, layers.irradiance_without);
+    EXPECT_GT(layers.irradiance_without(12, 9).g, 0.1f);
+}
+
 TEST(RenderFiv, AnEmptySceneChangesNothing)
 {
     const SceneProxy proxy(closedRoom());
