@@ -290,7 +290,8 @@ struct Arguments {
     std::vector<std::string> techniques = {"reference"};
     std::filesystem::path pictures;
     bool both = false;
-    std::string form = "ratio";
+    insitu::CompositeForm form = insitu::CompositeForm::Ratio;
+    std::vector<std::string> unmatched;
     std::vector<std::filesystem::path> rooms;
 };
 
@@ -354,8 +355,13 @@ int main(int argc, char** argv)
         ->capture_default_str();
     app.add_flag("--both", arguments.both, "Also without the focal length in EXIF (rows ...-l)");
     app.add_option("--form", arguments.form, "Composite form")
-        ->check(CLI::IsMember({"ratio", "difference"}))
-        ->capture_default_str();
+        ->transform(CLI::CheckedTransformer(std::map<std::string, insitu::CompositeForm>{
+            {"ratio", insitu::CompositeForm::Ratio},
+            {"difference", insitu::CompositeForm::Difference},
+            {"mixed", insitu::CompositeForm::Mixed}}));
+    app.add_option("--no-match", arguments.unmatched, "As in insert")
+        ->delimiter(',')
+        ->check(CLI::IsMember(insitu::kMatchParts));
     app.add_option("--technique", arguments.techniques, "One or several")
         ->check(CLI::IsMember({"reference", "fiv", "auto", "fiv-distant", "fiv-cube"}))
         ->capture_default_str();
@@ -368,9 +374,12 @@ int main(int argc, char** argv)
     app.add_option("rooms", arguments.rooms, "Folders of truth rooms")->required();
     CLI11_PARSE(app, argc, argv)
     options.render.min_samples = std::min(options.render.min_samples, options.render.max_samples);
-    options.composite.form = arguments.form == "ratio" ? insitu::CompositeForm::Ratio
-                                                       : insitu::CompositeForm::Difference;
-    fmt::print("{} samples, {} form\n", options.render.max_samples, arguments.form);
+    options.composite.form = arguments.form;
+    for (const std::string& part : arguments.unmatched)
+        insitu::leaveOut(part, options.match);
+    fmt::print("{} samples, {} form\n",
+               options.render.max_samples,
+               insitu::compositeFormName(arguments.form));
     fmt::print(
         "room           technique    object  contact  shadow  far px  codes changed% seconds  "
         "render "

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "composite/match/camera_match.h"
 #include "core/color_profile.h"
 #include "core/finding.h"
 #include "core/layers.h"
@@ -14,7 +15,13 @@ namespace insitu {
 enum class CompositeForm {
     Ratio,       ///< L_photo · L_with / L_without, reflectance of each pixel by itself
     Difference,  ///< L_photo + (L_with − L_without) with reflectance smoothed over a window
+    /// Between the two, pixel by pixel: as much of each pixel's own reflectance as stands out of
+    /// the photograph's noise, the least mean square error when both are known [Lee80] section II.
+    Mixed,
 };
+
+/// "ratio", "difference", "mixed".
+[[nodiscard]] const char* compositeFormName(CompositeForm form);
 
 struct CompositeOptions {
     CompositeForm form = CompositeForm::Ratio;
@@ -36,6 +43,8 @@ struct Composite {
     EncodedImage image;             ///< same size and depth as the photograph
     Image<Rgb> linear;              ///< scene-linear radiance of the whole picture
     Image<std::uint8_t> influence;  ///< 1 where the photograph was changed
+    /// What was put onto the photograph, after the camera's blur and aberration; working primaries.
+    PhotoLayers layers;
     double influence_fraction = 0.0;
     Findings findings;  ///< "composite-clipped-pixels"
 };
@@ -57,6 +66,10 @@ struct Composite {
 /// stays clipped unless the result falls below the clipping level. Pixels outside the influence
 /// mask are the photograph's own codes.
 ///
+/// `match` is what the photograph's camera does to light (camera_match.h): the layers get its
+/// optics, and every changed pixel the grain that it lacks. A rendered pixel has none but its own
+/// Monte Carlo error; a shadowed one keeps the photograph's noise in proportion to its light.
+///
 /// All of this happens in the photograph's own primaries, into which the layers are brought (what
 /// lies outside is cut), so that codes keep their meaning; `linear` is Rec. 709 again.
 [[nodiscard]] Composite compositeDifferential(const EncodedImage& photo,
@@ -64,6 +77,8 @@ struct Composite {
                                               double relative_exposure,
                                               const RenderLayers& layers,
                                               const CompositeOptions& options,
-                                              const glm::dmat3& rec709_from_linear = glm::dmat3(1));
+                                              const glm::dmat3& rec709_from_linear = glm::dmat3(1),
+                                              const CameraMatch& match = {},
+                                              const Image<float>& receiver_depth_m = {});
 
 }  // namespace insitu

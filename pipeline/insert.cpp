@@ -4,6 +4,7 @@
 #include "calib/photo_calibration.h"
 #include "core/color.h"
 #include "core/io/image_io.h"
+#include "pipeline/photo_match.h"
 #include "pipeline/probe_location.h"
 #include "pipeline/radiance_mesh_stage.h"
 #include "pipeline/reference_capture.h"
@@ -366,12 +367,27 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
                             foreground.mark.distance_m,
                             photo_radiance,
                             result.render.layers);
+    const Image<float> distance_m = proxyDistance(proxy, camera);
+    CameraMatchOptions match = options.match;
+    if (project.photo_focus_m) match.focus_m = project.photo_focus_m;
+    if (project.photo_vignetting) match.vignetting_a = project.photo_vignetting;
+    match.estimate_vignetting = match.estimate_vignetting || project.estimate_vignetting;
+    result.match =
+        estimateCameraMatch(result.photo.image,
+                            result.photo_response,
+                            photo_radiance,
+                            distance_m,
+                            {camera.principal_px, aperturePxM(result.photo.metadata, camera)},
+                            match);
+    append(result.findings, result.match.findings);
     result.composite = compositeDifferential(result.photo.image,
                                              result.photo_response,
                                              result.photo_relative_exposure,
                                              result.render.layers,
                                              options.composite,
-                                             primaries);
+                                             primaries,
+                                             result.match.match,
+                                             distance_m);
     append(result.findings, result.composite.findings);
     append(result.findings, cache.findings());
     watch.lap("composite");

@@ -21,6 +21,7 @@ struct InsertOptions {
     RoomLightOptions light;
     InsertionOptions render;
     CompositeOptions composite;
+    CameraMatchOptions match;
     /// Take the focal length in EXIF into account.
     bool use_exif_focal = true;
     /// Where the results of stages are kept for the next run (stage_cache.h); empty: nowhere.
@@ -55,6 +56,7 @@ struct InsertResult {
     CameraEstimate camera;
     CapturedLight light;
     InsertionResult render;
+    CameraMatchEstimate match;
     Composite composite;
     PhotoBalance balance;
     Findings findings;  ///< of all stages, in order

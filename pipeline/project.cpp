@@ -136,6 +136,17 @@ Project readProject(const std::filesystem::path& path)
     project.photo = {existingFile(photo.at("image"), folder), readExposure(photo)};
     if (const auto balance = photo.find("white_balance"))
         project.white_balance = readWhiteBalance(*balance);
+    if (const auto vignetting = photo.find("vignetting")) {
+        if (vignetting->value().is_string()) {
+            if (vignetting->text() != "auto") vignetting->fail("is neither a number nor \"auto\"");
+            project.estimate_vignetting = true;
+        } else {
+            project.photo_vignetting = vignetting->number();
+            if (!(*project.photo_vignetting >= 0.0 && *project.photo_vignetting <= 3.0))
+                vignetting->fail("must be in [0, 3]");
+        }
+    }
+    if (const auto focus = photo.find("focus_m")) project.photo_focus_m = focus->positive();
     if (const auto foreground = photo.find("foreground"))
         project.foreground = readForeground(*foreground, folder);
     readCamera(root.at("camera"), folder, project);

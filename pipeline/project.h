@@ -108,6 +108,11 @@ struct Project {
     ProjectImage photo;
     ProjectWhiteBalance white_balance;
     std::vector<ProjectForeground> foreground;
+    /// Distance at which the photograph is sharp, metres; absent: found from its edges, if any tell.
+    std::optional<double> photo_focus_m;
+    /// Fall-off of light towards its corners (Vignetting::a), given or to be estimated.
+    std::optional<double> photo_vignetting;
+    bool estimate_vignetting = false;
     std::optional<std::filesystem::path> camera_lines;
     std::optional<std::filesystem::path> camera_file;
     ProjectLight light;

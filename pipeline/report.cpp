@@ -3,6 +3,7 @@
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 
+#include <cmath>
 #include <numbers>
 
 namespace insitu {
@@ -52,6 +53,25 @@ Json balanceJson(const PhotoBalance& balance)
     return json;
 }
 
+/// What of the photograph's camera the objects got, and what was seen but counts as nothing.
+Json cameraMatchJson(const CameraMatchEstimate& estimate)
+{
+    const CameraMatch& match = estimate.match;
+    Json grain = Json::array();
+    for (int c = 0; c < 3; ++c)
+        grain.push_back(match.grain.sigmaAt(c, 118.0));
+    return {{"grain_codes_at_middle_grey", grain},
+            {"blur_px", match.blur_px},
+            {"blur_px_sigma", estimate.blur.sigma_of_sigma_px},
+            {"edges", estimate.blur.edges},
+            {"magnification_red", match.magnification.r},
+            {"magnification_blue", match.magnification.b},
+            {"vignetting", match.vignetting.a},
+            {"vignetting_sigma",
+             std::isfinite(estimate.vignetting.sigma) ? Json(estimate.vignetting.sigma) : Json()},
+            {"focus_m", match.depth_of_field ? Json(match.depth_of_field->focus_m) : Json()}};
+}
+
 }  // namespace
 
 void writeReport(const std::filesystem::path& path,
@@ -98,9 +118,10 @@ void writeReport(const std::filesystem::path& path,
           {"table_bytes", result.render.table_bytes},
           {"table_seconds", result.render.table_seconds}}},
         {"composite",
-         {{"form", options.composite.form == CompositeForm::Ratio ? "ratio" : "difference"},
+         {{"form", compositeFormName(options.composite.form)},
           {"influence_codes", options.composite.influence_codes},
           {"influence_fraction", result.composite.influence_fraction}}},
+        {"camera_match", cameraMatchJson(result.match)},
         {"findings", toJson(result.findings)},
         {"seconds", times},
         {"from_cache", cached}};
@@ -112,10 +133,25 @@ void writeLayers(const std::filesystem::path& path, const InsertResult& result)
     const RenderLayers& layers = result.render.layers;
     std::vector<ExrChannel> channels;
     addColorLayer(channels, "beauty", result.composite.linear);
-    addColorLayer(channels, "object", layers.object);
-    addColorLayer(channels, "irradiance.with", layers.irradiance_with);
-    addColorLayer(channels, "irradiance.without", layers.irradiance_without);
-    channels.push_back({"object.A", layers.alpha});
+    // As they lie on the photograph, with its camera's blur and aberration.
+    const PhotoLayers& matched = result.composite.layers;
+    addColorLayer(channels, "object", matched.object);
+    addColorLayer(channels, "irradiance.with", matched.irradiance_with);
+    addColorLayer(channels, "irradiance.without", matched.irradiance_without);
+    Image<Rgb> ratio(layers.alpha.width(), layers.alpha.height(), Rgb(1.0f));
+    Image<Rgb> difference(layers.alpha.width(), layers.alpha.height());
+    Image<float> coverage(layers.alpha.width(), layers.alpha.height());
+    for (std::size_t i = 0; i < ratio.pixelCount(); ++i) {
+        const Rgb with = matched.irradiance_with.pixels()[i];
+        const Rgb without = matched.irradiance_without.pixels()[i];
+        for (int c = 0; c < 3; ++c)
+            if (without[c] > 0.0f) ratio.pixels()[i][c] = with[c] / without[c];
+        difference.pixels()[i] = with - without;
+        coverage.pixels()[i] = matched.coverage.pixels()[i].g;
+    }
+    addColorLayer(channels, "shadow.ratio", ratio);
+    addColorLayer(channels, "shadow.difference", difference);
+    channels.push_back({"object.A", std::move(coverage)});
     channels.push_back({"depth.Z", layers.depth_m});
     channels.push_back({"variance.object.Y", layers.object_variance});
     channels.push_back({"variance.ratio.Y", layers.ratio_variance});

@@ -3,6 +3,8 @@
 #include "pipeline/report.h"
 #include "pipeline/stage_cache.h"
 
+#include <map>
+
 namespace insitu::cli {
 
 namespace {
@@ -13,8 +15,9 @@ struct InsertArguments {
     std::filesystem::path hdr;
     std::filesystem::path layers;
     std::filesystem::path report;
-    std::string technique = "reference";
-    std::string form = "ratio";
+    Technique technique = Technique::Reference;
+    CompositeForm form = CompositeForm::Ratio;
+    std::vector<std::string> unmatched;
     bool ignore_exif_focal = false;
     bool no_cache = false;
     int bits = 0;
@@ -32,9 +35,11 @@ void runInsert(InsertArguments& arguments, Context& context)
     options.light.seed = context.options.seed;
     options.render.interreflection.seed = context.options.seed;
     options.render.min_samples = std::min(options.render.min_samples, options.render.max_samples);
-    options.render.technique = arguments.technique == "fiv" ? Technique::Fiv : Technique::Reference;
-    options.composite.form =
-        arguments.form == "ratio" ? CompositeForm::Ratio : CompositeForm::Difference;
+    options.render.technique = arguments.technique;
+    options.composite.form = arguments.form;
+    for (const std::string& part : arguments.unmatched)
+        leaveOut(part, options.match);
+    options.match.seed = context.options.seed;
     options.use_exif_focal = !arguments.ignore_exif_focal;
 
     if (arguments.no_cache)
@@ -77,8 +82,11 @@ void registerInsert(CLI::App& app, Context& context)
                      "atlas and local light: no noise, a little bias, many times as quick) or auto "
                      "(fiv if sampled pixels show that it keeps "
                      "--max-error)")
-        ->check(CLI::IsMember({"reference", "fiv", "auto"}))
-        ->capture_default_str();
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, Technique>{{"reference", Technique::Reference},
+                                             {"fiv", Technique::Fiv},
+                                             {"auto", Technique::Auto}}))
+        ->default_str("reference");
     command
         ->add_option("--max-error",
                      render.target_error,
@@ -93,9 +101,23 @@ void registerInsert(CLI::App& app, Context& context)
             "--max-seconds", render.max_seconds, "Stop rendering after this time; 0: no limit")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
-    command->add_option("--composite", arguments->form, "ratio or difference")
-        ->check(CLI::IsMember({"ratio", "difference"}))
-        ->capture_default_str();
+    command
+        ->add_option("--composite",
+                     arguments->form,
+                     "How the change of light is put onto the photograph: ratio, difference, or "
+                     "mixed pixel by pixel by the photograph's noise")
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, CompositeForm>{{"ratio", CompositeForm::Ratio},
+                                                 {"difference", CompositeForm::Difference},
+                                                 {"mixed", CompositeForm::Mixed}}))
+        ->default_str("ratio");
+    command
+        ->add_option("--no-match",
+                     arguments->unmatched,
+                     "What of the photograph's look the objects are not to get: grain, blur, "
+                     "vignetting, aberration, focus, dither, all")
+        ->delimiter(',')
+        ->check(CLI::IsMember(kMatchParts));
     command->add_flag(
         "--ignore-exif-focal", arguments->ignore_exif_focal, "Calibrate from the lines alone");
     command->add_flag("--align",

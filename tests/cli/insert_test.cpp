@@ -99,6 +99,18 @@ TEST_F(InsertProject, ASecondRunFindsTheStagesOfTheFirst)
     ASSERT_EQ(insert(more).exit_code, 0);
     EXPECT_EQ(readJsonFile(report)["from_cache"], Json({"probe"}));
     EXPECT_NE(bytesOf(picture()), bytesOf(first));
+    const std::string turned = bytesOf(picture());
+
+    // What the photograph's camera does to the objects can be left out; it is no part of the render.
+    std::vector<std::string> plain = more;
+    plain.insert(plain.end(), {"--no-match", "grain,blur", "--composite", "mixed"});
+    ASSERT_EQ(insert(plain).exit_code, 0);
+    const Json told = readJsonFile(report);
+    EXPECT_EQ(told["from_cache"], Json({"probe", "render"}));
+    EXPECT_EQ(told["camera_match"]["grain_codes_at_middle_grey"], Json({0.0, 0.0, 0.0}));
+    EXPECT_EQ(told["camera_match"]["blur_px"], 0.0);
+    EXPECT_EQ(told["composite"]["form"], "mixed");
+    EXPECT_NE(bytesOf(picture()), turned);
 }
 
 TEST_F(InsertProject, ABadProjectEndsWithItsPlaceCauseAndExitCode)
@@ -120,6 +132,18 @@ TEST_F(InsertProject, ABadProjectEndsWithItsPlaceCauseAndExitCode)
          [](Json& p) { p["photo"]["image"] = "nowhere.jpg"; },
          1,
          "nowhere.jpg"},
+        {"focus behind the camera",
+         [](Json& p) { p["photo"]["focus_m"] = -2.0; },
+         1,
+         "photo.focus_m"},
+        {"vignetting beyond a lens",
+         [](Json& p) { p["photo"]["vignetting"] = 5.0; },
+         1,
+         "photo.vignetting"},
+        {"vignetting in words",
+         [](Json& p) { p["photo"]["vignetting"] = "some"; },
+         1,
+         "auto"},
         {"missing model",
          [](Json& p) { p["objects"][0]["model"] = "nowhere.obj"; },
          1,
@@ -198,6 +222,8 @@ TEST_F(InsertProject, WrongUsage)
 {
     EXPECT_EQ(runProgram({"insert"}).exit_code, 2);
     EXPECT_EQ(insert({"--technique", "magic"}).exit_code, 2);
+    EXPECT_EQ(insert({"--no-match", "colour"}).exit_code, 2);
+    EXPECT_EQ(insert({"--composite", "sum"}).exit_code, 2);
     EXPECT_EQ(runProgram({"insert", "--help"}).exit_code, 0);
 }
 
