@@ -108,7 +108,8 @@ struct Project {
     ProjectImage photo;
     ProjectWhiteBalance white_balance;
     std::vector<ProjectForeground> foreground;
-    /// Distance at which the photograph is sharp, metres; absent: found from its edges, if any tell.
+    /// Distance at which the photograph is sharp, metres; absent: found from its edges, if any
+    /// tell.
     std::optional<double> photo_focus_m;
     /// Fall-off of light towards its corners (Vignetting::a), given or to be estimated.
     std::optional<double> photo_vignetting;

@@ -12,9 +12,14 @@ using KeyList = std::initializer_list<std::string_view>;
 inline const KeyList kProject = {
     "format", "version", "photo", "camera", "light", "room", "objects", "note"};
 inline const KeyList kImage = {"image", "exposure_seconds", "f_number", "iso"};
-inline const KeyList kPhoto = {
-    "image", "exposure_seconds", "f_number", "iso", "white_balance", "focus_m", "vignetting",
-    "foreground"};
+inline const KeyList kPhoto = {"image",
+                               "exposure_seconds",
+                               "f_number",
+                               "iso",
+                               "white_balance",
+                               "focus_m",
+                               "vignetting",
+                               "foreground"};
 inline const KeyList kForeground = {
     "polygon_px", "mask", "distance_m", "feather_px", "refine_px", "note"};
 inline const KeyList kCamera = {"lines", "file"};

@@ -101,7 +101,8 @@ TEST_F(InsertProject, ASecondRunFindsTheStagesOfTheFirst)
     EXPECT_NE(bytesOf(picture()), bytesOf(first));
     const std::string turned = bytesOf(picture());
 
-    // What the photograph's camera does to the objects can be left out; it is no part of the render.
+    // What the photograph's camera does to the objects can be left out; it is no part of the
+    // render.
     std::vector<std::string> plain = more;
     plain.insert(plain.end(), {"--no-match", "grain,blur", "--composite", "mixed"});
     ASSERT_EQ(insert(plain).exit_code, 0);
@@ -140,10 +141,7 @@ TEST_F(InsertProject, ABadProjectEndsWithItsPlaceCauseAndExitCode)
          [](Json& p) { p["photo"]["vignetting"] = 5.0; },
          1,
          "photo.vignetting"},
-        {"vignetting in words",
-         [](Json& p) { p["photo"]["vignetting"] = "some"; },
-         1,
-         "auto"},
+        {"vignetting in words", [](Json& p) { p["photo"]["vignetting"] = "some"; }, 1, "auto"},
         {"missing model",
          [](Json& p) { p["objects"][0]["model"] = "nowhere.obj"; },
          1,

@@ -72,7 +72,8 @@ TEST(EdgeProfile, ChromaticAberrationWithinTenPercent)
 {
     const glm::dvec3 truth(0.0012, 0.0, -0.0018);
     const Image<Rgb> light = squares(0.7, truth);
-    const auto edges = edgeProfiles(throughCamera(light, 0.003), Image<std::uint8_t>(kWidth, kHeight, 1));
+    const auto edges =
+        edgeProfiles(throughCamera(light, 0.003), Image<std::uint8_t>(kWidth, kHeight, 1));
     const ChromaticAberration estimate =
         estimateChromaticAberration(edges, glm::dvec2(kWidth, kHeight) / 2.0);
     EXPECT_TRUE(estimate.significant);
@@ -80,8 +81,8 @@ TEST(EdgeProfile, ChromaticAberrationWithinTenPercent)
         EXPECT_NEAR(estimate.magnification[c], truth[c], 0.1 * std::abs(truth[c]));
         EXPECT_LT(estimate.magnification_sigma[c], 0.05 * std::abs(truth[c]));
     }
-    const auto plain = edgeProfiles(throughCamera(squares(0.7), 0.003),
-                                    Image<std::uint8_t>(kWidth, kHeight, 1));
+    const auto plain =
+        edgeProfiles(throughCamera(squares(0.7), 0.003), Image<std::uint8_t>(kWidth, kHeight, 1));
     const ChromaticAberration none =
         estimateChromaticAberration(plain, glm::dvec2(kWidth, kHeight) / 2.0);
     EXPECT_FALSE(none.significant);

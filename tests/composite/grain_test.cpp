@@ -79,11 +79,10 @@ TEST_P(GrainOfCameras, SigmaWithinTenPercentAtEveryLevel)
         for (int c = 0; c < 3; ++c) {
             if (truth.level[i][c] < 12.0 || truth.level[i][c] > 235.0) continue;
             const double sigma = std::sqrt(truth.variance[i][c] - 1.0 / 12.0);
-            const double error =
-                estimate.model.sigmaAt(c, truth.level[i][c]) / sigma - 1.0;
+            const double error = estimate.model.sigmaAt(c, truth.level[i][c]) / sigma - 1.0;
             // Ten percent is what is asked; a single patch's own truth is known to about one.
-            EXPECT_LT(std::abs(error), 0.12) << "level " << truth.level[i][c] << " channel " << c
-                                             << " sigma " << sigma;
+            EXPECT_LT(std::abs(error), 0.12)
+                << "level " << truth.level[i][c] << " channel " << c << " sigma " << sigma;
             squares += error * error;
             count += 1.0;
         }
@@ -129,8 +128,8 @@ std::vector<std::array<double, 6>> windowFeatures(const Image<Rgb>& noise)
     return features;
 }
 
-/// Share of the odd windows, held out, that a linear detector (per feature: mean and pooled deviation, summed
-/// as likelihoods) puts on the right side; 0.5 is a guess.
+/// Share of the odd windows, held out, that a linear detector (per feature: mean and pooled
+/// deviation, summed as likelihoods) puts on the right side; 0.5 is a guess.
 double detectorAccuracy(const std::vector<std::array<double, 6>>& a,
                         const std::vector<std::array<double, 6>>& b)
 {
@@ -191,7 +190,8 @@ TEST(Grain, PatchDetectorCannotTellItFromTheCameras)
             noise.fill(Image<Rgb>(kInside, kInside));
             for (int y = 0; y < kInside; ++y)
                 for (int x = 0; x < kInside; ++x) {
-                    RandomStream random(9, static_cast<std::uint64_t>((y0 + y) * kWidth + x0 + x), 0);
+                    RandomStream random(
+                        9, static_cast<std::uint64_t>((y0 + y) * kWidth + x0 + x), 0);
                     for (int c = 0; c < 3; ++c) {
                         const double sigma = model.sigmaAt(c, mean[c]);
                         const auto rounded = [&](double n) {

@@ -29,11 +29,14 @@ struct SimulatedPhoto {
         for (int y = 0; y < h; ++y)
             for (int x = 0; x < w; ++x) {
                 RandomStream random(
-                    17, static_cast<std::uint64_t>(y) * 100003u + static_cast<std::uint64_t>(x), shot);
+                    17,
+                    static_cast<std::uint64_t>(y) * 100003u + static_cast<std::uint64_t>(x),
+                    shot);
                 for (int c = 0; c < 3; ++c) {
                     const double e = light(x, y)[c];
                     exposure(x, y)[c] = static_cast<float>(
-                        e + std::sqrt(read_noise * read_noise + photon_noise * e) * random.normal());
+                        e +
+                        std::sqrt(read_noise * read_noise + photon_noise * e) * random.normal());
                 }
             }
         if (demosaic) exposure = demosaiced(exposure);
