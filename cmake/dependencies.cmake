@@ -18,9 +18,9 @@ pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 if(INSITU_BUILD_TESTS)
   find_package(GTest REQUIRED)
   find_package(assimp REQUIRED)  # an independent reader to compare ours with
-  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs ximgproc)  # its guided filter
+  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs quality ximgproc)  # its SSIM, guided filter
 endif()
 if(INSITU_BUILD_BENCH)
   find_package(benchmark REQUIRED)
-  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs aruco photo video)  # peers
+  find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs aruco photo saliency video)  # peers
 endif()

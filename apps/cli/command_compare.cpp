@@ -1,7 +1,10 @@
 #include "apps/cli/command.h"
+#include "core/color.h"
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "evaluate/error_metrics.h"
+#include "evaluate/ssim.h"
+#include "evaluate/visible_differences.h"
 
 #include <iostream>
 
@@ -16,6 +19,8 @@ struct CompareArguments {
     fs::path picture;
     fs::path mask;
     fs::path json;
+    bool vdp = false;
+    ViewingConditions viewing;
 };
 
 /// One image as given: radiance, or codes with what they decode to.
@@ -55,6 +60,60 @@ PixelMask readMask(const fs::path& path, const Image<Rgb>& reference)
     return mask;
 }
 
+/// What is judged as an observer sees it: of two encoded pictures only.
+struct SeenMetrics {
+    std::optional<double> ssim;         ///< nothing for pictures below 11x11 pixels
+    std::optional<double> vdp_percent;  ///< when asked for
+};
+
+Image<float> luminanceOf(const Image<Rgb>& linear)
+{
+    Image<float> grey(linear.width(), linear.height());
+    for (std::size_t i = 0; i < grey.pixelCount(); ++i)
+        grey.pixels()[i] = luminance(linear.pixels()[i]);
+    return grey;
+}
+
+/// Mean of a map over the mask's pixels; the map's middle is the mask's.
+std::optional<double> meanWithin(const Image<float>& map, const PixelMask& mask)
+{
+    const int left = (mask.width() - map.width()) / 2;
+    const int top = (mask.height() - map.height()) / 2;
+    double sum = 0.0;
+    double count = 0.0;
+    for (int y = 0; y < map.height(); ++y)
+        for (int x = 0; x < map.width(); ++x)
+            if (mask(x + left, y + top) != 0) {
+                sum += static_cast<double>(map(x, y));
+                ++count;
+            }
+    return count > 0.0 ? std::optional(sum / count) : std::nullopt;
+}
+
+SeenMetrics compareAsSeen(const CompareArguments& arguments,
+                          const Image<Rgb>& reference,
+                          const Image<Rgb>& picture,
+                          const PixelMask& mask,
+                          Progress& progress)
+{
+    SeenMetrics seen;
+    constexpr int kWindow = 11;
+    if (std::min(reference.width(), reference.height()) >= kWindow) {
+        const StructuralSimilarity similarity =
+            structuralSimilarity(encodedGrey(reference), encodedGrey(picture), 1.0);
+        seen.ssim = mask.empty() ? similarity.mean : meanWithin(similarity.map, mask);
+    }
+    if (!arguments.vdp) return seen;
+    VisibleDifferences differences = visibleDifferences(
+        luminanceOf(reference), luminanceOf(picture), arguments.viewing, progress);
+    seen.vdp_percent = differences.percent_seen;
+    if (mask.empty()) return seen;
+    for (float& value : differences.probability.pixels())
+        value = static_cast<double>(value) > kSeenProbability ? 100.0f : 0.0f;
+    seen.vdp_percent = meanWithin(differences.probability, mask);
+    return seen;
+}
+
 Findings judge(const ErrorMetrics& metrics)
 {
     Findings findings;
@@ -68,7 +127,9 @@ Findings judge(const ErrorMetrics& metrics)
     return findings;
 }
 
-Json toJson(const ErrorMetrics& metrics, const std::optional<CodeDifference>& codes)
+Json toJson(const ErrorMetrics& metrics,
+            const std::optional<CodeDifference>& codes,
+            const SeenMetrics& seen)
 {
     const auto channels = [](const glm::dvec3& v) { return Json::array({v.x, v.y, v.z}); };
     Json json = {{"pixels", metrics.pixels},
@@ -84,10 +145,14 @@ Json toJson(const ErrorMetrics& metrics, const std::optional<CodeDifference>& co
         json["differing_pixels"] = codes->differing_pixels;
         json["max_codes"] = codes->max_codes;
     }
+    if (seen.ssim) json["ssim"] = *seen.ssim;
+    if (seen.vdp_percent) json["vdp_percent"] = *seen.vdp_percent;
     return json;
 }
 
-void printMetrics(const ErrorMetrics& metrics, const std::optional<CodeDifference>& codes)
+void printMetrics(const ErrorMetrics& metrics,
+                  const std::optional<CodeDifference>& codes,
+                  const SeenMetrics& seen)
 {
     std::cout << fmt::format("pixels        {}\n", metrics.pixels)
               << fmt::format("NRMSE         {:.6g}\n", metrics.nrmse)
@@ -98,6 +163,8 @@ void printMetrics(const ErrorMetrics& metrics, const std::optional<CodeDifferenc
         std::cout << fmt::format("differing     {} pixels, at most by {} codes\n",
                                  codes->differing_pixels,
                                  codes->max_codes);
+    if (seen.ssim) std::cout << fmt::format("SSIM          {:.6g}\n", *seen.ssim);
+    if (seen.vdp_percent) std::cout << fmt::format("VDP %         {:.6g}\n", *seen.vdp_percent);
 }
 
 void runCompare(const CompareArguments& arguments, Context& context)
@@ -119,9 +186,16 @@ void runCompare(const CompareArguments& arguments, Context& context)
     std::optional<CodeDifference> codes;
     if (reference.encoded && reference.encoded->max_code == picture.encoded->max_code)
         codes = compareCodes(*reference.encoded, *picture.encoded, mask);
+    SeenMetrics seen;
+    if (reference.encoded)
+        seen = compareAsSeen(arguments, reference.linear, picture.linear, mask, context.progress());
+    else if (arguments.vdp)
+        throw InputError(arguments.reference.string(),
+                         "is a radiance image; --vdp compares pictures for a display, tonemap both "
+                         "first");
     context.print(judge(*metrics));
-    printMetrics(*metrics, codes);
-    if (!arguments.json.empty()) writeJson(arguments.json, toJson(*metrics, codes));
+    printMetrics(*metrics, codes, seen);
+    if (!arguments.json.empty()) writeJson(arguments.json, toJson(*metrics, codes, seen));
 }
 
 }  // namespace
@@ -135,13 +209,28 @@ void registerCompare(CLI::App& app, Context& context)
     command->add_option("picture", arguments->picture, "What it does look like")->required();
     command->add_option("--mask", arguments->mask, "Compare only where this picture is bright");
     command->add_option("--json", arguments->json, "Write the numbers to this file");
+    command->add_flag("--vdp",
+                      arguments->vdp,
+                      "Also pixels whose difference is visible, in per cent (Daly's predictor)");
+    command
+        ->add_option("--pixels-per-degree",
+                     arguments->viewing.pixels_per_degree,
+                     "How near the observer of --vdp sits")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command
+        ->add_option("--display-white-cd-m2",
+                     arguments->viewing.white_cd_m2,
+                     "Luminance of the display's white, for --vdp")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
     context.addCommonOptions(*command);
     command->footer(
         "Both are radiance images (.exr, .hdr, .pfm), or both encoded pictures (.png, .jpg, "
         ".tif),\n"
         "which are decoded from sRGB first.\n"
         "Examples:\n"
-        "  insitu compare truth.png final.png\n"
+        "  insitu compare truth.png final.png --vdp\n"
         "  insitu compare truth.exr final.exr --mask shadow.png --json errors.json");
     command->callback([arguments, &context] { runCompare(*arguments, context); });
 }

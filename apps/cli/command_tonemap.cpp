@@ -49,6 +49,10 @@ SceneStatistics commonStatistics(const std::vector<fs::path>& inputs)
 void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Context& context)
 {
     context.start();
+    if (arguments.same_curve && !arguments.tone.sharesCurves())
+        throw CLI::ValidationError("--same-curve",
+                                   "operator histogram makes its curve from each picture's foveal "
+                                   "image; leave one of the two out");
     const std::vector<fs::path> outputs = outputsOf(arguments);
     for (const fs::path& output : outputs)
         context.checkOutput(output);
@@ -94,6 +98,7 @@ void registerTonemap(CLI::App& app, Context& context)
         "Examples:\n"
         "  insitu tonemap room.exr -o room.png --operator ashikhmin\n"
         "  insitu tonemap night.exr -o night.png --key 0.09 --white 3\n"
+        "  insitu tonemap night.exr -o night.png --operator histogram --scene-white-cd-m2 0.1\n"
         "  insitu tonemap *.exr -o pictures/ --same-curve");
     command->callback(
         [arguments, command, &context] { runTonemap(*arguments, *command, context); });

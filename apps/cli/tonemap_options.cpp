@@ -21,8 +21,13 @@ const std::vector<FlagUse>& flagUses()
     static const std::vector<FlagUse> uses = {{"--key", {"reinhard"}},
                                               {"--white", {"reinhard"}},
                                               {"--contrast-threshold", {"ashikhmin"}},
-                                              {"--scene-white-cd-m2", {"ashikhmin"}},
-                                              {"--display-white-cd-m2", {"ashikhmin"}},
+                                              {"--scene-white-cd-m2", {"ashikhmin", "histogram"}},
+                                              {"--display-white-cd-m2", {"ashikhmin", "histogram"}},
+                                              {"--display-black-cd-m2", {"histogram"}},
+                                              {"--field-of-view-deg", {"histogram"}},
+                                              {"--veil", {"histogram"}},
+                                              {"--acuity", {"histogram"}},
+                                              {"--mesopic-color", {"histogram"}},
                                               {"--select", {"selective"}},
                                               {"--importance-threshold", {"selective"}},
                                               {"--importance", {"selective"}},
@@ -49,8 +54,9 @@ void TonemapOptions::addTo(CLI::App& command)
     command
         .add_option("--operator",
                     name_,
-                    "reinhard (global), ashikhmin (local), selective (local where it matters)")
-        ->check(CLI::IsMember({"reinhard", "ashikhmin", "selective"}))
+                    "reinhard (global), ashikhmin (local), selective (local where it matters), "
+                    "histogram (what an observer there could see)")
+        ->check(CLI::IsMember({"reinhard", "ashikhmin", "selective", "histogram"}))
         ->capture_default_str();
     command.add_option("--key", reinhard_.key, "Where the average luminance lands (reinhard)")
         ->check(CLI::PositiveNumber)
@@ -69,15 +75,38 @@ void TonemapOptions::addTo(CLI::App& command)
         ->capture_default_str();
     command
         .add_option("--scene-white-cd-m2",
-                    ashikhmin_.viewing.scene_white_cd_m2,
-                    "Luminance of scene value 1 (ashikhmin); default: the log average becomes 30")
+                    viewing_.scene_white_cd_m2,
+                    "Luminance of scene value 1 (ashikhmin, histogram); default: the log average "
+                    "becomes 30")
         ->check(CLI::PositiveNumber);
     command
         .add_option("--display-white-cd-m2",
-                    ashikhmin_.viewing.display_white_cd_m2,
-                    "Luminance of the display's white (ashikhmin)")
+                    viewing_.display_white_cd_m2,
+                    "Luminance of the display's white (ashikhmin, histogram)")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
+    command
+        .add_option("--display-black-cd-m2",
+                    histogram_.display_black_cd_m2,
+                    "Luminance of the display's black where it stands (histogram)")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    command
+        .add_option("--field-of-view-deg",
+                    histogram_.field_of_view_deg,
+                    "Horizontal field of view of the picture (histogram)")
+        ->check(CLI::Range(0.0, 170.0))
+        ->capture_default_str();
+    command
+        .add_flag("--veil,!--no-veil", histogram_.veil, "Light scattered in the eye (histogram)")
+        ->default_str("true");
+    command.add_flag("--acuity,!--no-acuity", histogram_.acuity, "Blur of dim light (histogram)")
+        ->default_str("true");
+    command
+        .add_flag("--mesopic-color,!--no-mesopic-color",
+                  histogram_.color,
+                  "Loss of colour in dim light (histogram)")
+        ->default_str("true");
     command.add_option("--select", selected_, "Operator whose local part is selected (selective)")
         ->check(CLI::IsMember({"ashikhmin"}))
         ->capture_default_str();
@@ -94,11 +123,12 @@ void TonemapOptions::addTo(CLI::App& command)
         "--always", always_, "Picture, white where the local part always counts (selective)");
 }
 
-std::shared_ptr<const SeparableOperator> TonemapOptions::makeSeparable(
-    const std::string& name) const
+std::unique_ptr<SeparableOperator> TonemapOptions::makeSeparable(const std::string& name) const
 {
-    if (name == "ashikhmin") return makeAshikhmin(ashikhmin_);
-    return makeReinhard(reinhard_);
+    if (name == "reinhard") return makeReinhard(reinhard_);
+    AshikhminOptions options = ashikhmin_;
+    options.viewing = viewing_;
+    return makeAshikhmin(options);
 }
 
 std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command) const
@@ -114,8 +144,12 @@ std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command) c
                                        "is not a flag of operator " + name_ +
                                            "; leave it out or choose " + use.operators.front());
     }
-    if (name_ == "reinhard") return makeReinhard(reinhard_);
-    if (name_ == "ashikhmin") return makeAshikhmin(ashikhmin_);
+    if (name_ == "histogram") {
+        HistogramAdjustmentOptions histogram = histogram_;
+        histogram.viewing = viewing_;
+        return makeHistogramAdjustment(histogram);
+    }
+    if (!selective) return makeSeparable(name_);
     SelectiveOptions options;
     options.importance_threshold = importance_threshold_;
     options.importance = readMap(importance_);

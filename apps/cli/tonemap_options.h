@@ -1,6 +1,7 @@
 #pragma once
 
 #include "composite/tonemap/ashikhmin.h"
+#include "composite/tonemap/histogram_adjustment.h"
 #include "composite/tonemap/reinhard.h"
 #include "composite/tonemap/selective.h"
 
@@ -20,15 +21,18 @@ public:
     /// The operator that the flags ask for. Reads maps. CLI::ValidationError for a flag that the
     /// operator does not have, InputError for bad values and files.
     [[nodiscard]] std::unique_ptr<ToneMapOperator> make(const CLI::App& command) const;
+    /// False when the operator makes its curve from the picture alone.
+    [[nodiscard]] bool sharesCurves() const { return name_ != "histogram"; }
 
 private:
-    [[nodiscard]] std::shared_ptr<const SeparableOperator> makeSeparable(
-        const std::string& name) const;
+    [[nodiscard]] std::unique_ptr<SeparableOperator> makeSeparable(const std::string& name) const;
 
     std::string name_ = "reinhard";
     std::string selected_ = "ashikhmin";
     ReinhardOptions reinhard_;
+    ViewingOptions viewing_;
     AshikhminOptions ashikhmin_;
+    HistogramAdjustmentOptions histogram_;
     double importance_threshold_ = SelectiveOptions{}.importance_threshold;
     std::filesystem::path importance_;
     std::filesystem::path always_;

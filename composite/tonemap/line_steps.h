@@ -103,7 +103,9 @@ INSITU_KERNEL void filterOdd(const float* even,
     }
 }
 
-/// Half-way between in[0] and in[step]: eight neighbours, kernel[0] for the two nearest.
+/// Half-way between in[0] and in[step], from kReach neighbours on either side; kernel[0] is for the
+/// nearest.
+template <int kReach>
 INSITU_KERNEL void midpointLine(const float* in,
                                 std::ptrdiff_t step,
                                 const float* kernel,
@@ -112,9 +114,11 @@ INSITU_KERNEL void midpointLine(const float* in,
 {
     for (std::ptrdiff_t i = 0; i < count; ++i) {
         const float* const p = in + i;
-        out[i] = kernel[0] * (p[0] + p[step]) + kernel[1] * (p[-step] + p[2 * step]) +
-                 kernel[2] * (p[-2 * step] + p[3 * step]) +
-                 kernel[3] * (p[-3 * step] + p[4 * step]);
+        float sum = kernel[0] * (p[0] + p[step]);
+#pragma GCC unroll 16
+        for (int k = 1; k < kReach; ++k)
+            sum += kernel[k] * (p[-k * step] + p[(k + 1) * step]);
+        out[i] = sum;
     }
 }
 

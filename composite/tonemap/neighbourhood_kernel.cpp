@@ -38,6 +38,10 @@ struct Line {
     alignas(64) float values[kLongestLine + 48];
 };
 
+/// What a line of midpoints needs before its first place, and in all.
+constexpr int kBefore = kMidpointReach - 1;
+constexpr int kAround = 2 * kMidpointReach - 1;
+
 /// Every second pixel of the picture after G_4.
 INSITU_KERNEL void reducePatch(const LuminancePatch& patch, const Kernel& kernel, Plane& half)
 {
@@ -101,15 +105,16 @@ INSITU_KERNEL void doublePlane(const Plane& from, const Kernel& midpoint, Plane&
     const int first = -to.margin / 2;
     const int count = to.stride / 2;
     for (int y = -to.margin; y < to.rows - to.margin; ++y) {
-        const float* in = from.at(first - 3, (y - (y & 1)) / 2);
+        const float* in = from.at(first - kBefore, (y - (y & 1)) / 2);
         if ((y & 1) != 0) {
-            midpointLine(in, from.stride, midpoint.data(), between.values, count + 7);
+            midpointLine<kMidpointReach>(
+                in, from.stride, midpoint.data(), between.values, count + kAround);
             in = between.values;
         }
-        midpointLine(in + 3, 1, midpoint.data(), middles.values, count);
+        midpointLine<kMidpointReach>(in + kBefore, 1, midpoint.data(), middles.values, count);
         float* const out = to.at(-to.margin, y);
         for (int x = 0; x < count; ++x) {
-            out[2 * x] = in[x + 3];
+            out[2 * x] = in[x + kBefore];
             out[2 * x + 1] = middles.values[x];
         }
     }
@@ -212,15 +217,17 @@ INSITU_KERNEL void coarseScale(
     Search& search, const Plane& plane, int y, int first, int count, std::array<Scales, 2>& g)
 {
     constexpr std::size_t scale = kFineScales + 1 + kIndex;
-    const float* in = plane.at(first - 3, y / 2);
+    const float* in = plane.at(first - kBefore, y / 2);
     Line& line = search.between[kIndex];
     if (y % 2 != 0) {
-        midpointLine(in, plane.stride, search.kernels.midpoint.data(), line.values, count + 7);
+        midpointLine<kMidpointReach>(
+            in, plane.stride, search.kernels.midpoint.data(), line.values, count + kAround);
         in = line.values;
     }
     Line& middles = search.lines[1][scale];
-    midpointLine(in + 3, 1, search.kernels.midpoint.data(), middles.values, count);
-    g[0][scale] = in + 3;
+    midpointLine<kMidpointReach>(
+        in + kBefore, 1, search.kernels.midpoint.data(), middles.values, count);
+    g[0][scale] = in + kBefore;
     g[1][scale] = middles.values;
 }
 

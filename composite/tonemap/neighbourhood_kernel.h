@@ -13,9 +13,10 @@
 /// picture after s = 4, 12…20 on every fourth after s = 8, then interpolated half-way twice. In its
 /// own pixels each of these levels starts from a standard deviation of 1 and goes to the same five,
 /// 1.5, 1.75, … 2.5, so one set of kernels serves both. Sampling a Gaussian of variance a and then
-/// filtering with one of variance b leaves an alias of exp(-pi²/2 ab/(a+b)): below 7e-2 % of the
-/// highest frequency for a = 1, b = 1.25 (level pixels), which hardly any is left of. The sampled
-/// places are multiples of 2 and 4 of the picture, whatever the tile, so tiles have no seams.
+/// filtering with one of variance b leaves an alias of exp(-2 pi² ab / (a + b)) at most, 2e-5 for
+/// a = 1, b = 1.25 (pixels of the level); midpoints of a Gaussian of 1.5 err by 8e-5 of its peak.
+/// The sampled places are multiples of 2 and 4 of the picture, whatever the tile, so tiles have no
+/// seams.
 namespace insitu::tonemap {
 
 constexpr int kScales = 10;  ///< [Ashikhmin02]: largest neighbourhood, pixels
@@ -27,11 +28,13 @@ constexpr std::array<int, kFineScales> kFineRadius = {2, 4, 6, 8, 10};
 constexpr std::array<int, kCoarseScales> kCoarseRadius = {5, 6, 7, 8, 9};
 constexpr int kReduceRadius = 8;
 
-/// What each level needs around a tile, in its own pixels, from the coarsest on: midpoints take 3
-/// and 4 neighbours.
-constexpr int kQuarterMargin = 6;
+/// Neighbours of a midpoint on either side.
+constexpr int kMidpointReach = 6;
+
+/// What each level needs around a tile, in its own pixels, from the coarsest on.
+constexpr int kQuarterMargin = 9;
 constexpr int kQuarterInputMargin = kQuarterMargin + 10;
-constexpr int kHalfMargin = 4;
+constexpr int kHalfMargin = kMidpointReach;
 constexpr int kHalfWideMargin =
     2 * kQuarterInputMargin;  ///< of s = 8, which the quarter starts from
 constexpr int kHalfInputMargin = kHalfWideMargin + 8;

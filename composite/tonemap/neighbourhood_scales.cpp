@@ -22,29 +22,30 @@ Kernel gaussian(double variance, int radius)
     return kernel;
 }
 
-/// Midpoint from eight neighbours that errs least, in the mean over white noise blurred with the
+/// Midpoint from its neighbours that errs least, in the mean over white noise blurred with the
 /// level's narrowest Gaussian (standard deviation 1.5), and is exact for constants: the best linear
-/// unbiased estimate with covariance exp(-d² / (4·1.5²)). By symmetry four weights, each for two
+/// unbiased estimate with covariance exp(-d² / (4·1.5²)). By symmetry one weight for each two
 /// neighbours, and one Lagrange multiplier.
 Kernel midpointKernel()
 {
-    constexpr int kUnknowns = 5;
+    constexpr std::size_t kWeights = kMidpointReach;
+    constexpr std::size_t kUnknowns = kWeights + 1;
     constexpr double kDeviation = 1.5;
     const auto covariance = [](double d) {
         return std::exp(-d * d / (4.0 * kDeviation * kDeviation));
     };
     std::array<std::array<double, kUnknowns + 1>, kUnknowns> rows{};
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < kWeights; ++i) {
         const double a = 0.5 + static_cast<double>(i);
-        for (std::size_t j = 0; j < 4; ++j) {
+        for (std::size_t j = 0; j < kWeights; ++j) {
             const double b = 0.5 + static_cast<double>(j);
             rows[i][j] = covariance(a - b) + covariance(a + b);
         }
-        rows[i][4] = 1.0;
-        rows[i][5] = covariance(a);
-        rows[4][i] = 2.0;
+        rows[i][kWeights] = 1.0;
+        rows[i][kUnknowns] = covariance(a);
+        rows[kWeights][i] = 2.0;
     }
-    rows[4][5] = 1.0;
+    rows[kWeights][kUnknowns] = 1.0;
     // Gauss-Jordan with the largest pivot.
     for (std::size_t c = 0; c < kUnknowns; ++c) {
         std::size_t pivot = c;
@@ -59,7 +60,7 @@ Kernel midpointKernel()
         }
     }
     Kernel kernel{};
-    for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t i = 0; i < kWeights; ++i)
         kernel[i] = static_cast<float>(rows[i][kUnknowns] / rows[i][i]);
     return kernel;
 }

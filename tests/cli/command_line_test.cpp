@@ -168,6 +168,15 @@ TEST(Tonemap, ChoosesOperatorsAndRefusesForeignFlags)
     EXPECT_EQ(readPhoto(output).image.codes(2, 2), glm::u16vec3(118));
     EXPECT_EQ(run({"--operator", "selective", "--contrast-threshold", "0.4"}).exit_code, kDone);
 
+    EXPECT_EQ(run({"--operator", "histogram", "--no-veil", "--field-of-view-deg", "150"}).exit_code,
+              kDone);
+    EXPECT_EQ(
+        run({"--operator", "histogram", "--scene-white-cd-m2", "9", "--display-black-cd-m2", "2"})
+            .exit_code,
+        kDone);
+    EXPECT_EQ(run({"--operator", "histogram", "--same-curve"}).exit_code, kWrongUsage);
+    EXPECT_EQ(run({"--operator", "ashikhmin", "--no-veil"}).exit_code, kWrongUsage);
+
     const ProgramRun foreign = run({"--operator", "ashikhmin", "--key", "0.2"});
     EXPECT_EQ(foreign.exit_code, kWrongUsage);
     EXPECT_THAT(foreign.messages, HasSubstr("--key"));
@@ -177,6 +186,31 @@ TEST(Tonemap, ChoosesOperatorsAndRefusesForeignFlags)
         run({"--operator", "selective", "--always", (folder / "map.png").string()});
     EXPECT_EQ(unfit.exit_code, kFailed);
     EXPECT_THAT(unfit.messages, HasSubstr("5x6"));
+}
+
+TEST(Compare, JudgesEncodedPicturesAsTheyAreSeen)
+{
+    const TemporaryFolder folder;
+    writeEncoded(folder / "a.png", grey(16, 16, 100));
+    writeEncoded(folder / "b.png", grey(16, 16, 120));
+    writeRadiance(folder / "a.exr", Image<Rgb>(16, 16, Rgb(1.0f)));
+    const auto run = [&](const std::string& name, const std::string& other) {
+        return runProgram({"compare",
+                           (folder / name).string(),
+                           (folder / other).string(),
+                           "--vdp",
+                           "--json",
+                           (folder / "out.json").string(),
+                           "--force"});
+    };
+    EXPECT_EQ(run("a.png", "b.png").exit_code, kDone);
+    const auto json = nlohmann::json::parse(textOf(folder / "out.json"));
+    // Plain pictures: (2ab + C1) / (a² + b² + C1) with a, b in codes, C1 = (0.01·255)².
+    EXPECT_NEAR(json.at("ssim").get<double>(), 24006.5 / 24406.5, 1e-4);
+    EXPECT_EQ(json.at("vdp_percent").get<double>(), 0.0);  // the mean level is not judged
+    const ProgramRun radiance = run("a.exr", "a.exr");
+    EXPECT_EQ(radiance.exit_code, kFailed);
+    EXPECT_THAT(radiance.messages, HasSubstr("--vdp"));
 }
 
 TEST(Tonemap, ManyPicturesGoIntoAFolderUnderOneCurve)

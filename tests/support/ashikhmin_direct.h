@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <vector>
 
@@ -41,9 +42,18 @@ inline Image<double> blurred(const Image<double>& image, double deviation)
     return pass(pass(image, 0, 1), 1, 0);
 }
 
-/// La of every pixel; luminance in cd/m².
-inline Image<double> adaptation(const Image<double>& luminance, double threshold)
+/// How near to the threshold a contrast is undecided: the first crossing is then a matter of
+/// rounding, and La jumps from one scale to another.
+constexpr double kUndecided = 5e-4;
+
+/// La of every pixel; luminance in cd/m². `undecided`, when given, becomes 1 where a contrast up to
+/// the first clear crossing is that near to the threshold.
+inline Image<double> adaptation(const Image<double>& luminance,
+                                double threshold,
+                                Image<std::uint8_t>* undecided = nullptr)
 {
+    if (undecided != nullptr)
+        *undecided = Image<std::uint8_t>(luminance.width(), luminance.height(), 0);
     std::map<int, Image<double>> g;
     g[0] = luminance;
     for (int s = 1; s <= 10; ++s)
@@ -64,6 +74,13 @@ inline Image<double> adaptation(const Image<double>& luminance, double threshold
             }
             before = middle > 0.0 ? difference / middle : 0.0;
         }
+        for (int s = 1; s <= 10 && undecided != nullptr; ++s) {
+            const double middle = g[s].pixels()[i];
+            const double contrast =
+                middle > 0.0 ? std::abs(1.0 - g[2 * s].pixels()[i] / middle) : 0.0;
+            if (contrast > threshold + kUndecided) break;
+            if (contrast > threshold - kUndecided) undecided->pixels()[i] = 1;
+        }
     }
     return adapted;
 }
@@ -71,13 +88,14 @@ inline Image<double> adaptation(const Image<double>& luminance, double threshold
 /// Display luminance in [0, 1] of every pixel; `local` false: pixels adapt to themselves.
 inline Image<double> displayLuminance(const Image<Rgb>& scene,
                                       const AshikhminOptions& options,
-                                      bool local = true)
+                                      bool local = true,
+                                      Image<std::uint8_t>* undecided = nullptr)
 {
     const double scale = options.viewing.scale(measureScene(scene));
     Image<double> l(scene.width(), scene.height());
     for (std::size_t i = 0; i < l.pixelCount(); ++i)
         l.pixels()[i] = scale * static_cast<double>(luminance(scene.pixels()[i]));
-    const Image<double> la = local ? adaptation(l, options.contrast_threshold) : l;
+    const Image<double> la = local ? adaptation(l, options.contrast_threshold, undecided) : l;
     const auto [least, most] = std::minmax_element(l.pixels().begin(), l.pixels().end());
     const double black = perceptualCapacity(*least);
     const double white = options.viewing.display_white_cd_m2;

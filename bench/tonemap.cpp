@@ -1,0 +1,259 @@
+// Global, local and selective tone mapping side by side: speed and error in one run, the tables 12
+// to 16 of [Michael10] for our operators.
+//
+//   tonemap [--runs N] [--threshold T] [--saliency] PICTURE[@MEGAPIXELS]…
+//
+// Pictures are .exr, .hdr or .pfm; with @MEGAPIXELS resampled to that size first (by area, or cubic
+// where it grows). Times are processor seconds of one thread, the least of N runs, without reading
+// and writing of files; other programs on the machine count little then. Errors are those of
+// the curve alone (GTM) and of selective mapping (STM) against the local operator (LTM); of
+// pictures above 6 megapixels in their middle 2048x2048 pixels. Below 3 megapixels the local
+// operator is also compared with its direct evaluation.
+#include "composite/tonemap/ashikhmin.h"
+#include "composite/tonemap/selective.h"
+#include "core/io/image_io.h"
+#include "core/parallel.h"
+#include "evaluate/ssim.h"
+#include "evaluate/visible_differences.h"
+#include "tests/support/ashikhmin_direct.h"
+
+#include <CLI/CLI.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/saliency.hpp>
+
+#include <ctime>
+#include <iostream>
+
+namespace insitu {
+namespace {
+
+double processorSeconds()
+{
+    timespec time{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+template <class Run>
+double leastSeconds(int runs, const Run& run)
+{
+    double least = 1e300;
+    for (int i = 0; i < runs; ++i) {
+        const double start = processorSeconds();
+        run();
+        least = std::min(least, processorSeconds() - start);
+    }
+    return least;
+}
+
+/// The operator's curve alone.
+class GlobalPart : public SeparableOperator {
+public:
+    explicit GlobalPart(std::shared_ptr<const SeparableOperator> whole) : whole_(std::move(whole))
+    {
+    }
+    [[nodiscard]] std::unique_ptr<ToneCurve> curve(const SceneStatistics& statistics) const override
+    {
+        return whole_->curve(statistics);
+    }
+    [[nodiscard]] std::unique_ptr<LocalAdaptation> local() const override { return nullptr; }
+
+private:
+    std::shared_ptr<const SeparableOperator> whole_;
+};
+
+/// "FILE" or "FILE@MEGAPIXELS".
+Image<Rgb> readPicture(const std::string& argument)
+{
+    const auto at = argument.rfind('@');
+    Image<Rgb> picture = readRadiance(argument.substr(0, at)).pixels;
+    if (at == std::string::npos) return picture;
+    const double pixels = 1e6 * std::stod(argument.substr(at + 1));
+    const double scale = std::sqrt(pixels / static_cast<double>(picture.pixelCount()));
+    Image<Rgb> resampled(static_cast<int>(std::lround(scale * picture.width())),
+                         static_cast<int>(std::lround(scale * picture.height())));
+    const auto matOf = [](Image<Rgb>& image) {
+        return cv::Mat(image.height(), image.width(), CV_32FC3, &image(0, 0));
+    };
+    cv::Mat to = matOf(resampled);
+    cv::resize(
+        matOf(picture), to, to.size(), 0.0, 0.0, scale < 1.0 ? cv::INTER_AREA : cv::INTER_CUBIC);
+    for (Rgb& pixel : resampled.pixels())
+        pixel = glm::max(pixel, Rgb(0.0f));  // cubic overshoot
+    return resampled;
+}
+
+Image<Rgb> middle(const Image<Rgb>& image)
+{
+    constexpr int kSide = 2048;
+    if (image.pixelCount() < 6'000'000) return image;
+    const int width = std::min(kSide, image.width());
+    const int height = std::min(kSide, image.height());
+    Image<Rgb> part(width, height);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            part(x, y) = image((image.width() - width) / 2 + x, (image.height() - height) / 2 + y);
+    return part;
+}
+
+Image<float> displayGrey(const Image<Rgb>& display)
+{
+    Image<float> grey(display.width(), display.height());
+    for (std::size_t i = 0; i < grey.pixelCount(); ++i)
+        grey.pixels()[i] = luminance(display.pixels()[i]);
+    return grey;
+}
+
+struct Errors {
+    double ssim = 1.0;
+    double vdp_percent = 0.0;
+};
+
+Errors errorsOf(const Image<Rgb>& local, const Image<Rgb>& other)
+{
+    Progress silent;
+    setThreadCount(0);
+    const Image<Rgb> a = middle(local);
+    const Image<Rgb> b = middle(other);
+    const Errors errors{
+        structuralSimilarity(encodedGrey(a), encodedGrey(b), 1.0).mean,
+        visibleDifferences(displayGrey(a), displayGrey(b), {}, silent).percent_seen};
+    setThreadCount(1);
+    return errors;
+}
+
+/// Fine-grained saliency of the curve's picture, [0, 1].
+Image<float> saliencyOf(const Image<Rgb>& display)
+{
+    const Image<float> grey = encodedGrey(display);
+    cv::Mat codes(grey.height(), grey.width(), CV_8UC3);
+    for (int y = 0; y < grey.height(); ++y)
+        for (int x = 0; x < grey.width(); ++x)
+            codes.at<cv::Vec3b>(y, x) =
+                cv::Vec3b::all(static_cast<unsigned char>(std::lround(255.0f * grey(x, y))));
+    cv::Mat found;
+    cv::saliency::StaticSaliencyFineGrained::create()->computeSaliency(codes, found);
+    found.convertTo(found, CV_32F);
+    Image<float> map(grey.width(), grey.height());
+    for (int y = 0; y < grey.height(); ++y)
+        for (int x = 0; x < grey.width(); ++x)
+            map(x, y) = std::clamp(found.at<float>(y, x), 0.0f, 1.0f);
+    return map;
+}
+
+/// The local operator against its direct evaluation, RMS in per cent of the display's white, where
+/// no channel is cut off: of all pixels, and without those whose scale rounding decides.
+void compareWithDirect(const Image<Rgb>& scene, const Image<Rgb>& local)
+{
+    setThreadCount(0);
+    Image<std::uint8_t> undecided;
+    const Image<double> expected = direct::displayLuminance(scene, {}, true, &undecided);
+    setThreadCount(1);
+    double sum = 0.0;
+    double decided_sum = 0.0;
+    double counted = 0.0;
+    double decided = 0.0;
+    for (std::size_t i = 0; i < scene.pixelCount(); ++i) {
+        const Rgb& pixel = local.pixels()[i];
+        if (std::max({pixel.r, pixel.g, pixel.b}) >= 1.0f || luminance(scene.pixels()[i]) == 0.0f)
+            continue;  // black has no colour to scale
+        const double squared =
+            std::pow(static_cast<double>(luminance(pixel)) - expected.pixels()[i], 2);
+        sum += squared;
+        ++counted;
+        if (undecided.pixels()[i] != 0) continue;
+        decided_sum += squared;
+        ++decided;
+    }
+    std::cout << fmt::format(
+        "  LTM against its direct evaluation: {:.5f} % RMS; without the {:.0f} of {:.0f} pixels "
+        "with a contrast within {} of the threshold {:.5f} %\n",
+        100.0 * std::sqrt(sum / counted),
+        counted - decided,
+        counted,
+        direct::kUndecided,
+        100.0 * std::sqrt(decided_sum / decided));
+}
+
+struct BenchOptions {
+    int runs = 5;
+    double threshold = SelectiveOptions{}.importance_threshold;
+    bool saliency = false;
+    std::vector<std::string> pictures;
+};
+
+void benchPicture(const BenchOptions& options, const std::string& argument)
+{
+    Progress silent;
+    const Image<Rgb> scene = readPicture(argument);
+    const std::shared_ptr<const SeparableOperator> operator_whole = makeAshikhmin();
+    const GlobalPart global(operator_whole);
+    SelectiveOptions selection;
+    selection.importance_threshold = options.threshold;
+    const auto selective = makeSelective(operator_whole, selection);
+    SceneStatistics statistics;
+    const double measuring = leastSeconds(options.runs, [&] { statistics = measureScene(scene); });
+    const auto timed = [&](const ToneMapOperator& tone_map, Image<Rgb>& display) {
+        display = Image<Rgb>(scene.width(), scene.height());
+        return leastSeconds(options.runs,
+                            [&] { tone_map.mapInto(display, scene, statistics, silent); });
+    };
+    Image<Rgb> gtm;
+    Image<Rgb> ltm;
+    Image<Rgb> stm;
+    const double global_seconds = timed(global, gtm);
+    const double local_seconds = timed(*operator_whole, ltm);
+    const double selective_seconds = timed(*selective, stm);
+    const double megapixels = 1e-6 * static_cast<double>(scene.pixelCount());
+    const Errors global_errors = errorsOf(ltm, gtm);
+    const Errors selective_errors = errorsOf(ltm, stm);
+    std::cout << fmt::format(
+        "{}\n  {}x{}, selected {:.1f} %, statistics {:.1f} MPix/s\n"
+        "  GTM {:.1f} MPix/s, SSIM {:.4f}, VDP {:.2f} %, gain {:.2f}\n"
+        "  LTM {:.1f} MPix/s, with statistics {:.1f}\n"
+        "  STM {:.1f} MPix/s, {:.2f} times LTM, SSIM {:.4f}, VDP {:.2f} %, gain {:.2f}\n",
+        argument,
+        scene.width(),
+        scene.height(),
+        100.0 * selectedShare(*operator_whole, selection, scene),
+        megapixels / measuring,
+        megapixels / global_seconds,
+        global_errors.ssim,
+        global_errors.vdp_percent,
+        1.0 / (global_seconds * std::max(global_errors.vdp_percent, 0.01)),
+        megapixels / local_seconds,
+        megapixels / (local_seconds + measuring),
+        megapixels / selective_seconds,
+        local_seconds / selective_seconds,
+        selective_errors.ssim,
+        selective_errors.vdp_percent,
+        1.0 / (selective_seconds * std::max(selective_errors.vdp_percent, 0.01)));
+    if (scene.pixelCount() < 3'000'000) compareWithDirect(scene, ltm);
+    if (!options.saliency) return;
+    SelectiveOptions by_map = selection;
+    by_map.importance = saliencyOf(gtm);
+    const Errors errors =
+        errorsOf(ltm, makeSelective(operator_whole, by_map)->map(scene, statistics, silent));
+    std::cout << fmt::format("  by saliency: selected {:.1f} %, SSIM {:.4f}, VDP {:.2f} %\n",
+                             100.0 * selectedShare(*operator_whole, by_map, scene),
+                             errors.ssim,
+                             errors.vdp_percent);
+}
+
+}  // namespace
+}  // namespace insitu
+
+int main(int argc, char** argv)
+{
+    CLI::App app("Global, local and selective tone mapping: speed against error");
+    insitu::BenchOptions options;
+    app.add_option("--runs", options.runs, "Runs, of which the quickest counts");
+    app.add_option("--threshold", options.threshold, "Importance threshold");
+    app.add_flag("--saliency", options.saliency, "Also selection by a saliency map");
+    app.add_option("picture", options.pictures, "FILE or FILE@MEGAPIXELS")->required();
+    CLI11_PARSE(app, argc, argv);
+    insitu::setThreadCount(1);
+    for (const std::string& picture : options.pictures)
+        insitu::benchPicture(options, picture);
+    return 0;
+}

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "core/image.h"
+
+namespace insitu::tonemap {
+
+/// The picture as a grid of places that the fovea may rest on, and what scatters in the eye there.
+/// Private to this module.
+
+/// Mean colour of each square degree, seen with a horizontal field of `field_of_view` radians:
+/// 2 tan(field / 2) / 0.01745 pixels wide, as high as the picture's shape asks, at least 1x1, never
+/// finer than the picture. Means are exact: border pixels of a cell count with the part inside.
+/// Source: [Mollis04] equation 5.1.
+[[nodiscard]] Image<Rgb> fovealImage(const Image<Rgb>& scene, double field_of_view);
+
+/// Veiling luminance at each place: mean of all other places weighted with cos(angle) / angle², the
+/// angle a degree for each foveal pixel, below 90°.
+///
+/// One kernel for all places, so the sum is a convolution, done in the frequency plane: its cost
+/// hardly grows with the field. Linear perspective makes the outer pixels of a wide field smaller
+/// than a degree; the kernel leaves this aside, as [Mollis04] 5.3 does.
+/// Source: [Ward97] 4.4, with [Mollis04] 5.3's fixed kernel.
+[[nodiscard]] Image<Rgb> veilingLuminance(const Image<Rgb>& foveal);
+
+/// Part of the light that scatters, K of [Ward97] 4.4.
+constexpr float kScattered = 0.087f;
+
+}  // namespace insitu::tonemap

@@ -1,0 +1,193 @@
+#include "composite/tonemap/histogram_adjustment.h"
+
+#include "composite/tonemap/acuity_pyramid.h"
+#include "composite/tonemap/eye_model.h"
+#include "composite/tonemap/foveal_image.h"
+#include "composite/tonemap/histogram_curve.h"
+#include "composite/tonemap/line_steps.h"
+#include "core/color.h"
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace insitu {
+
+namespace {
+
+using tonemap::AcuityPyramid;
+using tonemap::HistogramCurve;
+
+/// What a place of the foveal image tells the pixels around it.
+struct Place {
+    Rgb veil{0.0f};      ///< scattered light, already times its share
+    float level = 0.0f;  ///< of the pyramid
+};
+
+Place mix(const Place& a, const Place& b, float share)
+{
+    return {a.veil + share * (b.veil - a.veil), a.level + share * (b.level - a.level)};
+}
+
+/// Position of pixel `i` of `pixels` among `places`: index, and share of the next.
+struct Between {
+    int index;
+    int next;
+    float share;
+};
+Between between(int i, int pixels, int places)
+{
+    const float position = std::clamp(
+        (static_cast<float>(i) + 0.5f) * static_cast<float>(places) / static_cast<float>(pixels) -
+            0.5f,
+        0.0f,
+        static_cast<float>(places - 1));
+    const int index = static_cast<int>(position);
+    return {index, std::min(index + 1, places - 1), position - static_cast<float>(index)};
+}
+
+/// Display luminance over luminance, from the curve; below its first point a straight line to
+/// black.
+float gainOf(const HistogramCurve& curve, float luminance)
+{
+    const auto first = static_cast<float>(curve.log_first);
+    const float last = static_cast<float>(curve.display.size() - 1);
+    const float log = tonemap::logOf(luminance);
+    if (!(luminance > 0.0f) || log <= first) return curve.display.front() / std::exp(first);
+    const float position = std::min((log - first) / static_cast<float>(curve.log_step), last);
+    const auto i = static_cast<std::size_t>(std::min(position, last - 1.0f));
+    const float share = position - static_cast<float>(i);
+    return (curve.display[i] + share * (curve.display[i + 1] - curve.display[i])) / luminance;
+}
+
+/// Cones fade out and rods, which see no colour, take over.
+Rgb mesopic(const Rgb& color)
+{
+    const auto cones = static_cast<float>(coneShare(static_cast<double>(luminance(color))));
+    if (cones >= 1.0f) return color;
+    return cones * color + (1.0f - cones) * Rgb(static_cast<float>(scotopicLuminance(color)));
+}
+
+/// One frame's observer.
+struct Observer {
+    Image<Place> places;
+    HistogramCurve curve;
+    float direct = 1.0f;   ///< share of the light that does not scatter
+    float scale = 1.0f;    ///< to cd/m²
+    float deepest = 0.0f;  ///< level of the pyramid
+};
+
+class HistogramAdjustment : public ToneMapOperator {
+public:
+    explicit HistogramAdjustment(const HistogramAdjustmentOptions& options) : options_(options) {}
+
+    void mapInto(Image<Rgb>& display,
+                 const Image<Rgb>& scene,
+                 const SceneStatistics& statistics,
+                 Progress& progress) const override
+    {
+        INSITU_CHECK(display.sameSize(scene), "{}x{}", display.width(), display.height());
+        if (scene.empty()) return;
+        progress.checkpoint();
+        const Observer observer = observe(scene, statistics);
+        const AcuityPyramid pyramid(scene, static_cast<int>(std::ceil(observer.deepest)));
+        progress.checkpoint();
+        parallelFor(0, scene.height(), [&](std::int64_t row) {
+            mapRow(observer, pyramid, scene, static_cast<int>(row), display);
+        });
+        progress.report("tone mapping", 1.0);
+    }
+
+private:
+    [[nodiscard]] Observer observe(const Image<Rgb>& scene, const SceneStatistics& statistics) const
+    {
+        const double field = options_.field_of_view_deg * std::numbers::pi / 180.0;
+        Observer observer;
+        observer.scale = static_cast<float>(options_.viewing.scale(statistics));
+        Image<Rgb> foveal = tonemap::fovealImage(scene, field);
+        for (Rgb& place : foveal.pixels())
+            place *= observer.scale;
+        observer.places = Image<Place>(foveal.width(), foveal.height());
+        if (options_.veil) {
+            observer.direct = 1.0f - tonemap::kScattered;
+            const Image<Rgb> veil = tonemap::veilingLuminance(foveal);
+            for (std::size_t i = 0; i < foveal.pixelCount(); ++i) {
+                observer.places.pixels()[i].veil = tonemap::kScattered * veil.pixels()[i];
+                foveal.pixels()[i] =
+                    observer.direct * foveal.pixels()[i] + observer.places.pixels()[i].veil;
+            }
+        }
+        // Equation 5.3: what the picture itself resolves in the middle, cycles per degree.
+        const double resolved = 0.5 * scene.width() / options_.field_of_view_deg;
+        std::vector<float> adaptation;
+        adaptation.reserve(foveal.pixelCount());
+        for (std::size_t i = 0; i < foveal.pixelCount(); ++i) {
+            adaptation.push_back(luminance(foveal.pixels()[i]));
+            if (!options_.acuity) continue;
+            const double level =
+                std::log2(resolved / acuity(static_cast<double>(adaptation.back())));
+            observer.places.pixels()[i].level = static_cast<float>(std::max(0.0, level));
+            observer.deepest = std::max(observer.deepest, observer.places.pixels()[i].level);
+        }
+        observer.curve = tonemap::histogramCurve(
+            adaptation, options_.display_black_cd_m2, options_.viewing.display_white_cd_m2);
+        return observer;
+    }
+
+    void mapRow(const Observer& observer,
+                const AcuityPyramid& pyramid,
+                const Image<Rgb>& scene,
+                int y,
+                Image<Rgb>& display) const
+    {
+        const Image<Place>& places = observer.places;
+        const Between down = between(y, scene.height(), places.height());
+        std::vector<Place> line(static_cast<std::size_t>(places.width()));
+        for (int i = 0; i < places.width(); ++i)
+            line[static_cast<std::size_t>(i)] =
+                mix(places(i, down.index), places(i, down.next), down.share);
+        for (int x = 0; x < scene.width(); ++x) {
+            const Between across = between(x, scene.width(), places.width());
+            const Place place = mix(line[static_cast<std::size_t>(across.index)],
+                                    line[static_cast<std::size_t>(across.next)],
+                                    across.share);
+            const Rgb light = observer.scale * pyramid.sample(x, y, place.level);
+            Rgb color = observer.direct * light + place.veil;
+            if (options_.color) color = mesopic(color);
+            display(x, y) = glm::min(color * gainOf(observer.curve, luminance(color)), Rgb(1.0f));
+        }
+    }
+
+    HistogramAdjustmentOptions options_;
+};
+
+}  // namespace
+
+Findings HistogramAdjustmentOptions::validate() const
+{
+    Findings findings = viewing.validate();
+    if (!(display_black_cd_m2 > 0.0 && display_black_cd_m2 < viewing.display_white_cd_m2))
+        findings.push_back(
+            {Severity::Error,
+             "tonemap-display-black",
+             fmt::format("the display's black is {} cd/m²; give a number above 0 and below its "
+                         "white, {}",
+                         display_black_cd_m2,
+                         viewing.display_white_cd_m2)});
+    if (!(field_of_view_deg > 0.0 && field_of_view_deg <= 170.0))
+        findings.push_back({Severity::Error,
+                            "tonemap-field-of-view",
+                            fmt::format("the field of view is {} degrees; give a number above 0 "
+                                        "and up to 170",
+                                        field_of_view_deg)});
+    return findings;
+}
+
+std::unique_ptr<ToneMapOperator> makeHistogramAdjustment(const HistogramAdjustmentOptions& options)
+{
+    requireValid(options.validate(), "tone mapping");
+    return std::make_unique<HistogramAdjustment>(options);
+}
+
+}  // namespace insitu
