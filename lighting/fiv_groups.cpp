@@ -59,8 +59,9 @@ Source sourceOf(const SilhouetteSet& set, const CellRadiance& light)
         flux.reserve(from.size() * fluxNumbers(Sum::Radiance));
         for (std::size_t i = 0; i < from.size(); ++i) {
             const glm::vec3 d = side * glm::vec3(set.directions[i]);
-            flux.insert(flux.end(), {d.x, d.y, d.z, from[i].r, from[i].g, from[i].b});
-            if (from[i] != Rgb(0.0f))
+            flux.insert(flux.end(),
+                        {d.x, d.y, d.z, from[i].r, from[i].g, from[i].b, light.solid_angles[i]});
+            if (light.solid_angles[i] > 0.0f)
                 source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
         }
         return flux;
@@ -76,19 +77,21 @@ Source sourceOfCorners(const SilhouetteSet& set, const CornerIrradiance& light)
     Source source;
     source.set = &set;
     source.shines.resize(light.along.size());
-    const auto list = [&](const std::vector<Corners>& from, unsigned bit) {
-        std::vector<float> flux;
-        flux.reserve(from.size() * fluxNumbers(Sum::Corners));
-        for (std::size_t i = 0; i < from.size(); ++i) {
-            for (const Rgb& corner : from[i])
-                flux.insert(flux.end(), {corner.r, corner.g, corner.b});
-            if (from[i] != Corners{})
-                source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
-        }
-        return flux;
-    };
-    source.along = list(light.along, 1u);
-    source.against = list(light.against, 2u);
+    const auto list =
+        [&](const std::vector<Corners>& from, const std::vector<float>& sky, unsigned bit) {
+            std::vector<float> flux;
+            flux.reserve(from.size() * fluxNumbers(Sum::Corners));
+            for (std::size_t i = 0; i < from.size(); ++i) {
+                for (const Rgb& corner : from[i])
+                    flux.insert(flux.end(), {corner.r, corner.g, corner.b});
+                flux.push_back(sky[i]);
+                if (from[i] != Corners{} || sky[i] != 0.0f)
+                    source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
+            }
+            return flux;
+        };
+    source.along = list(light.along, light.sky_along, 1u);
+    source.against = list(light.against, light.sky_against, 2u);
     return source;
 }
 

@@ -18,8 +18,8 @@ struct Block {
 
     alignas(64) Row x, y, z;     ///< local places; unused ones repeat the last
     alignas(64) Row nx, ny, nz;  ///< normals, where they are asked for
-    alignas(64) Row sums[12];    ///< what comes out, channel by channel
-    float uniform[12];           ///< the same for all places, to be added to the sums
+    alignas(64) Row sums[13];    ///< what comes out, channel by channel
+    float uniform[13];           ///< the same for all places, to be added to the sums
 };
 /// Blocks that are summed together: their sums stay in the second cache, a silhouette in the first.
 struct Group {
@@ -41,8 +41,12 @@ enum class Sum {
     Vectors,     ///< its irradiance vector: 9 sums, flux of 9 numbers a direction
     Irradiance,  ///< irradiance of one common normal: 3 sums, flux of 3 numbers a direction
     PerPlace,    ///< max(0, N·vector) with each place's own normal: 3 sums, flux of 9 numbers
-    Radiance,  ///< max(0, N·ω) radiance, each place's own normal: 3 sums, flux of ω and radiance
-    Corners,   ///< irradiance of one common normal in four lights: 12 sums, flux of 12 numbers
+    /// max(0, N·ω) radiance, each place's own normal: 3 sums and one for a sky of radiance 1; flux
+    /// of ω, radiance and solid angle.
+    Radiance,
+    /// Irradiance of one common normal in four lights: 12 sums and one for a sky of radiance 1,
+    /// flux of as many numbers.
+    Corners,
 };
 [[nodiscard]] constexpr int fluxNumbers(Sum sum)
 {
@@ -50,9 +54,9 @@ enum class Sum {
         case Sum::Irradiance:
             return 3;
         case Sum::Radiance:
-            return 6;
+            return 7;
         case Sum::Corners:
-            return 12;
+            return 13;
         case Sum::Vectors:
         case Sum::PerPlace:
             break;

@@ -260,6 +260,7 @@ INSITU_KERNEL void accumulate(const float* share, const float* flux, Block& bloc
             block.sums[0][i] += weight * flux[3];
             block.sums[1][i] += weight * flux[4];
             block.sums[2][i] += weight * flux[5];
+            block.sums[3][i] += weight * flux[6];
         }
     } else {
         for (int k = 0; k < fluxNumbers(kSum); ++k) {

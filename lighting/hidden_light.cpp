@@ -158,7 +158,7 @@ void hiddenIrradiance(const VisibilityAtlas& atlas,
                       const CellRadiance& light,
                       std::span<const glm::vec3> places,
                       std::span<const glm::vec3> unit_normals,
-                      std::span<Rgb> hidden,
+                      std::span<HiddenIrradiance> hidden,
                       float bias_texels)
 {
     INSITU_CHECK(places.size() == hidden.size() && places.size() == unit_normals.size(),
@@ -167,21 +167,22 @@ void hiddenIrradiance(const VisibilityAtlas& atlas,
                  unit_normals.size(),
                  places.size());
     checkLight(light, atlas);
-    sumHidden({fiv::sourceOf(atlas.silhouettes, light)},
-              Sum::Radiance,
-              places,
-              unit_normals,
-              bias_texels,
-              [&](const Block& block, std::size_t place, std::size_t i) {
-                  hidden[place] = fiv::irradianceOf(block, i);
-              });
+    sumHidden(
+        {fiv::sourceOf(atlas.silhouettes, light)},
+        Sum::Radiance,
+        places,
+        unit_normals,
+        bias_texels,
+        [&](const Block& block, std::size_t place, std::size_t i) {
+            hidden[place] = {fiv::irradianceOf(block, i), block.sums[3][i] + block.uniform[3]};
+        });
 }
 
 void hiddenIrradiance(const VisibilityAtlas& atlas,
                       const CornerIrradiance& light,
                       std::span<const glm::vec3> places,
                       std::span<const std::array<float, 4>> weights,
-                      std::span<Rgb> hidden,
+                      std::span<HiddenIrradiance> hidden,
                       float bias_texels)
 {
     INSITU_CHECK(places.size() == hidden.size() && places.size() == weights.size(),
@@ -196,9 +197,9 @@ void hiddenIrradiance(const VisibilityAtlas& atlas,
               {},
               bias_texels,
               [&](const Block& block, std::size_t place, std::size_t i) {
-                  hidden[place] = Rgb(0.0f);
+                  hidden[place] = {Rgb(0.0f), block.sums[12][i] + block.uniform[12]};
                   for (std::size_t corner = 0; corner < 4; ++corner)
-                      hidden[place] +=
+                      hidden[place].light +=
                           weights[place][corner] * fiv::irradianceOf(block, i, 3 * corner);
               });
 }

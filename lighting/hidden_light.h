@@ -65,16 +65,22 @@ void hiddenIrradiance(const ObjectLight& object,
                       std::span<Rgb> hidden,
                       float bias_texels = 0.0f);
 
+/// What objects hide from a place.
+struct HiddenIrradiance {
+    Rgb light{0.0f};
+    float sky = 0.0f;  ///< of a sky of radiance 1: π times the form factor from place to objects
+};
 /// Radiance of an atlas's cells times their solid angles, one a pair; each shines from its centre.
 /// Negative where what hides is brighter than what it hides.
 struct CellRadiance {
     std::vector<Rgb> along, against;
+    std::vector<float> solid_angles;  ///< of either cell of a pair
 };
 void hiddenIrradiance(const VisibilityAtlas& atlas,
                       const CellRadiance& light,
                       std::span<const glm::vec3> places_local,
                       std::span<const glm::vec3> unit_normals,
-                      std::span<Rgb> hidden,
+                      std::span<HiddenIrradiance> hidden,
                       float bias_texels = 0.0f);
 
 /// Irradiance that the cells of an atlas give surfaces of one normal, in four lights at once: those
@@ -84,6 +90,7 @@ struct CornerIrradiance {
     /// Of the cells of side 0 and of side 1, one a pair; 0 below the horizon. Negative where what
     /// hides is brighter than what it hides.
     std::vector<Corners> along, against;
+    std::vector<float> sky_along, sky_against;  ///< cosine times solid angle, 0 below the horizon
 };
 /// Irradiance of the hidden light, the corners mixed by each place's weights. What a place does not
 /// see is the same for all four, so this costs little more than one of them.
@@ -91,7 +98,7 @@ void hiddenIrradiance(const VisibilityAtlas& atlas,
                       const CornerIrradiance& light,
                       std::span<const glm::vec3> places_local,
                       std::span<const std::array<float, 4>> weights,
-                      std::span<Rgb> hidden,
+                      std::span<HiddenIrradiance> hidden,
                       float bias_texels = 0.0f);
 
 }  // namespace insitu

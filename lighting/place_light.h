@@ -54,7 +54,7 @@ struct PlaceLight {
 
 /// Which cells are looked along: those whose centre lies above a horizon and in a cone; and how.
 struct LookOptions {
-    std::optional<glm::vec3> horizon_normal;
+    std::optional<glm::vec3> horizon_normal{};
     glm::vec3 axis{0.0f};  ///< unit, or 0: no cone
     float least_cosine = -1.0f;
     /// Rays along a cell's side, > 0: their mean is its radiance.

@@ -83,6 +83,7 @@ FivScene makeScene(const RoomLight& room,
                    {},
                    fiv.light,
                    room.cellIrradiance(),
+                   {},
                    {}};
     result.table_seconds = secondsSince(start);
     result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
@@ -111,7 +112,7 @@ void lightEachOther(FivScene& scene,
     for (int round = 0; round < 3; ++round) {
         if (round == 2) scene.room_change = roomChange(scene, receivers);
         if (round > 0) shading.update(/*room_too=*/round == 2);
-        scene.glow = glowOf(scene, samples, shading.receive(places));
+        setGlow(scene, samples, shading.receive(places));
         progress.checkpoint();
     }
     shading.update(/*room_too=*/false);

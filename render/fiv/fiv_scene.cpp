@@ -25,7 +25,10 @@ LookOptions FivScene::limitsTowardObjects(glm::dvec3 place,
 CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light)
 {
     const std::size_t pairs = scene.coarse.cells().pairCount();
-    CellRadiance hideable{std::vector<Rgb>(pairs), std::vector<Rgb>(pairs)};
+    CellRadiance hideable{
+        std::vector<Rgb>(pairs), std::vector<Rgb>(pairs), std::vector<float>(pairs)};
+    for (std::size_t pair = 0; pair < pairs; ++pair)
+        hideable.solid_angles[pair] = light.geometry->solid_angles[2 * pair];
     for (std::size_t cell = 0; cell < light.radiance.size(); ++cell)
         (cell % 2 == 0 ? hideable.along : hideable.against)[cell / 2] =
             light.geometry->solid_angles[cell] *

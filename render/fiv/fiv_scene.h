@@ -4,6 +4,7 @@
 #include "lighting/light_spots.h"
 #include "lighting/place_light.h"
 #include "lighting/visibility_atlas.h"
+#include "render/fiv/object_glow.h"
 #include "render/object_scene.h"
 #include "render/renderer.h"
 
@@ -27,6 +28,7 @@ struct FivScene {
     /// cell of `coarse`, number 2·pair + side as in PlaceLight. What hides light sends this
     /// instead.
     std::vector<Rgb> glow;
+    ObjectGlow near;  ///< what of that is different close to the objects
 
     [[nodiscard]] const LocalFrame& frame() const { return coarse.silhouettes.local; }
     [[nodiscard]] Rgb glowAlong(glm::dvec3 direction) const

@@ -198,13 +198,14 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
         local[i] = scene_.frame().localFrom(places[i].position);
         normals[i] = glm::vec3(places[i].normal);
     }
-    std::vector<Rgb> lost(places.size(), Rgb(0.0f));
+    std::vector<HiddenIrradiance> lost(places.size());
     if (scene_.light != FivLight::Cube)
         hiddenIrradiance(scene_.coarse, hideable_, local, normals, lost, options_.bias_texels);
     std::vector<Received> result(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         const Rgb all = mean_irradiance_.lookUp(places[i].normal);
-        const Rgb left = glm::max(all - lost[i], Rgb(0.0f));
+        const Rgb sent = lost[i].sky * scene_.near.excess(places[i].position, places[i].normal);
+        const Rgb left = glm::max(all - lost[i].light + sent, Rgb(0.0f));
         const Rgb open = openIrradiance(places[i]);
         Received& r = result[i];
         // Where the mean light brings nothing, what objects send is all there is.
@@ -332,9 +333,9 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
     return samples;
 }
 
-std::vector<Rgb> glowOf(const FivScene& scene,
-                        std::span<const ObjectSample> samples,
-                        std::span<const ObjectShading::Received> received)
+void setGlow(FivScene& scene,
+             std::span<const ObjectSample> samples,
+             std::span<const ObjectShading::Received> received)
 {
     const SilhouetteSet& set = scene.coarse.silhouettes;
     const std::size_t pairs = scene.coarse.cells().pairCount();
@@ -346,6 +347,11 @@ std::vector<Rgb> glowOf(const FivScene& scene,
         local[i] = scene.frame().localFrom(samples[i].point.position);
     }
     std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
+    ObjectGlow near;
+    for (std::size_t i = 0; i < samples.size(); ++i)
+        near.add(
+            samples[i].point.position, samples[i].point.geometric_normal, samples[i].area, sent[i]);
+    scene.near = std::move(near);
     parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
         const std::size_t pair = static_cast<std::size_t>(number);
         glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
@@ -364,7 +370,7 @@ std::vector<Rgb> glowOf(const FivScene& scene,
             if (weights[side] > 0.0)
                 glow[2 * pair + static_cast<std::size_t>(side)] = Rgb(sums[side] / weights[side]);
     });
-    return glow;
+    scene.glow = std::move(glow);
 }
 
 }  // namespace insitu

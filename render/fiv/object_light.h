@@ -73,9 +73,9 @@ struct ObjectSample {
 };
 [[nodiscard]] std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count);
 
-/// What the objects send along each direction (FivScene::glow) when their samples receive this.
-[[nodiscard]] std::vector<Rgb> glowOf(const FivScene& scene,
-                                      std::span<const ObjectSample> samples,
-                                      std::span<const ObjectShading::Received> received);
+/// Sets what the objects send (FivScene::glow, near) when their samples receive this.
+void setGlow(FivScene& scene,
+             std::span<const ObjectSample> samples,
+             std::span<const ObjectShading::Received> received);
 
 }  // namespace insitu

@@ -21,6 +21,9 @@ constexpr int kRaysAlong = 2;
 /// Changes below this share of the irradiance are none.
 constexpr float kLeastChange = 1e-4f;
 
+/// Objects that hide less of a sky than this are too far away for their parts to matter.
+constexpr float kLeastSky = 0.01f;
+
 struct NodeGrid {
     int columns = 1;
     int rows = 1;
@@ -168,19 +171,34 @@ void ReceiverLight::look(std::span<const Square> squares,
 std::vector<Rgb> ReceiverLight::hidden(const Square& square,
                                        std::span<const ReceiverPlace> places) const
 {
-    std::vector<Rgb> hidden(square.places.size(), Rgb(0.0f));
-    if (scene_.light == FivLight::Cube) return hidden;
+    const std::size_t count = square.places.size();
+    std::vector<Rgb> lost(count, Rgb(0.0f));
+    if (scene_.light == FivLight::Cube) return lost;
+    const std::size_t pairs = scene_.atlas.cells().pairCount();
     CornerIrradiance light;
-    light.along.resize(scene_.atlas.cells().pairCount());
-    light.against.resize(light.along.size());
+    light.along.resize(pairs);
+    light.against.resize(pairs);
+    light.sky_along.resize(pairs, 0.0f);
+    light.sky_against.resize(pairs, 0.0f);
     for (std::size_t corner = 0; corner < 4; ++corner)
-        for (const Look& look : nodes_[square.nodes[corner]].looks)
-            (look.cell % 2 == 0 ? light.along : light.against)[look.cell / 2][corner] = look.loss;
-    std::vector<glm::vec3> local(square.places.size());
-    for (std::size_t i = 0; i < local.size(); ++i)
+        for (const Look& look : nodes_[square.nodes[corner]].looks) {
+            const bool along = look.cell % 2 == 0;
+            (along ? light.along : light.against)[look.cell / 2][corner] = look.loss;
+            (along ? light.sky_along : light.sky_against)[look.cell / 2] +=
+                0.25f * look.weight * look.beyond;
+        }
+    std::vector<glm::vec3> local(count);
+    for (std::size_t i = 0; i < count; ++i)
         local[i] = scene_.frame().localFrom(places[square.places[i]].point);
+    std::vector<HiddenIrradiance> hidden(count);
     hiddenIrradiance(scene_.atlas, light, local, square.weights, hidden);
-    return hidden;
+    for (std::size_t i = 0; i < count; ++i) {
+        const ReceiverPlace& place = places[square.places[i]];
+        lost[i] = hidden[i].light;
+        if (hidden[i].sky > kLeastSky)
+            lost[i] -= hidden[i].sky * scene_.near.excess(place.point, place.normal);
+    }
+    return lost;
 }
 
 std::vector<ReceiverLight::Square> ReceiverLight::squaresOf(std::span<const ReceiverPlace> places)

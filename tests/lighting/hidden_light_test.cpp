@@ -186,6 +186,7 @@ CellRadiance randomCells(const VisibilityAtlas& atlas, std::uint64_t seed)
         const auto value = [&] { return 0.01f * (random.uniform() - 0.3f); };
         cells.along.emplace_back(value(), value(), value());
         cells.against.emplace_back(value(), i % 3 == 0 ? 0.0f : value(), value());
+        cells.solid_angles.push_back(static_cast<float>(atlas.cells().solidAngle(i)));
     }
     return cells;
 }
@@ -218,11 +219,17 @@ TEST(HiddenLight, RadianceOfCellsMeetsEachPlacesNormal)
     std::vector<glm::vec3> normals;
     for (const glm::vec3& p : places)
         normals.push_back(glm::normalize(glm::vec3(0.3f - p.y, 0.5f + p.x, -p.z)));
-    std::vector<Rgb> hidden(places.size());
+    std::vector<HiddenIrradiance> hidden(places.size());
     hiddenIrradiance(atlas, light, places, normals, hidden, 0.5f);
+    CellRadiance sky;
+    for (const float solid_angle : light.solid_angles)
+        sky.along.emplace_back(solid_angle);
+    sky.against = sky.along;
     for (std::size_t i = 0; i < places.size(); ++i) {
         const Rgb expected = hiddenOneByOne(atlas, light, places[i], normals[i], 0.5f);
-        EXPECT_LT(glm::length(hidden[i] - expected), 2e-5) << i;
+        EXPECT_LT(glm::length(hidden[i].light - expected), 2e-5) << i;
+        const Rgb white = hiddenOneByOne(atlas, sky, places[i], normals[i], 0.5f);
+        EXPECT_NEAR(hidden[i].sky, white.g, 2e-5) << i;
     }
 }
 
@@ -234,6 +241,8 @@ TEST(HiddenLight, FourLightsAtOnceAreTheirMix)
     CornerIrradiance corners;
     corners.along.resize(atlas.cells().pairCount());
     corners.against.resize(atlas.cells().pairCount());
+    corners.sky_along.assign(corners.along.size(), 0.5f);
+    corners.sky_against = corners.sky_along;
     std::vector<CellRadiance> lights;
     for (std::size_t corner = 0; corner < 4; ++corner) {
         lights.push_back(randomCells(atlas, 7 + corner));
@@ -247,14 +256,14 @@ TEST(HiddenLight, FourLightsAtOnceAreTheirMix)
     std::vector<std::array<float, 4>> weights;
     for (std::size_t i = 0; i < places.size(); ++i)
         weights.push_back({0.1f, 0.2f, 0.3f, 0.01f * static_cast<float>(i)});
-    std::vector<Rgb> hidden(places.size());
+    std::vector<HiddenIrradiance> hidden(places.size());
     hiddenIrradiance(atlas, corners, places, weights, hidden);
     for (std::size_t i = 0; i < places.size(); ++i) {
         Rgb expected(0.0f);
         for (std::size_t corner = 0; corner < 4; ++corner)
             expected +=
                 weights[i][corner] * hiddenOneByOne(atlas, lights[corner], places[i], up, 0.0f);
-        EXPECT_LT(glm::length(hidden[i] - expected), 2e-5) << i;
+        EXPECT_LT(glm::length(hidden[i].light - expected), 2e-5) << i;
     }
     weights.pop_back();
     EXPECT_THROW(hiddenIrradiance(atlas, corners, places, weights, hidden), LogicError);

@@ -1,6 +1,7 @@
 #include "core/parallel.h"
 #include "lighting/light_spots.h"
 #include "lighting/place_light.h"
+#include "render/fiv/object_glow.h"
 #include "render/renderer.h"
 #include "tests/support/shapes.h"
 #include "tests/support/tolerance.h"
@@ -349,6 +350,25 @@ TEST(RenderFiv, ValidateNamesEveryMistake)
     options.fiv.object_samples = 0;
     options.fiv.atlas.resolution = 1;
     EXPECT_EQ(options.validate().size(), 7u);
+}
+
+TEST(ObjectGlow, WeighsWhatIsNearByItsFormFactor)
+{
+    const glm::dvec3 up(0.0, 1.0, 0.0);
+    ObjectGlow glow;
+    EXPECT_EQ(glow.excess(glm::dvec3(0.0), up), Rgb(0.0f));
+    glow.add({0.0, 0.1, 0.0}, -up, 0.01, Rgb(1.0f));
+    glow.add({0.0, 1.0, 0.0}, -up, 0.01, Rgb(5.0f));
+    // A surface that looks away, and one below the horizon.
+    glow.add({0.1, 0.5, 0.0}, up, 1.0, Rgb(100.0f));
+    glow.add({0.0, -0.2, 0.0}, up, 1.0, Rgb(100.0f));
+    // Area over squared distance (plus area) of both, against their plain mean, 3.
+    const double near = 0.01 / (0.01 + 0.01);
+    const double far = 0.01 / (1.0 + 0.01);
+    const double expected = (near + 5.0 * far) / (near + far) - 3.0;
+    EXPECT_NEAR(glow.excess(glm::dvec3(0.0), up).g, expected, 1e-5);
+    // Far away all points are as near as each other.
+    EXPECT_NEAR(glow.excess({0.0, -1000.0, 0.0}, up).g, 0.0, 0.01);
 }
 
 TEST(PlaceLight, SeesTheFurnaceAndItsChange)

@@ -1,0 +1,60 @@
+#include "render/fiv/object_glow.h"
+
+#include <numeric>
+
+namespace insitu {
+
+void ObjectGlow::add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb radiance)
+{
+    const std::size_t lane = count_++ % kLanes;
+    if (lane == 0) bundles_.emplace_back();
+    Bundle& b = bundles_.back();
+    b.x[lane] = static_cast<float>(position.x);
+    b.y[lane] = static_cast<float>(position.y);
+    b.z[lane] = static_cast<float>(position.z);
+    b.normal_x[lane] = static_cast<float>(normal.x);
+    b.normal_y[lane] = static_cast<float>(normal.y);
+    b.normal_z[lane] = static_cast<float>(normal.z);
+    b.area[lane] = static_cast<float>(area);
+    b.red[lane] = radiance.r;
+    b.green[lane] = radiance.g;
+    b.blue[lane] = radiance.b;
+}
+
+Rgb ObjectGlow::excess(glm::dvec3 place, glm::dvec3 unit_normal) const
+{
+    const glm::vec3 x(place);
+    const glm::vec3 n(unit_normal);
+    // Weight, red, green and blue of the mean by form factors and of the one without distance.
+    std::array<Lanes, 4> near{}, all{};
+    for (const Bundle& b : bundles_)
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            const float dx = b.x[i] - x.x;
+            const float dy = b.y[i] - x.y;
+            const float dz = b.z[i] - x.z;
+            const float here = dx * n.x + dy * n.y + dz * n.z;
+            const float there = -(dx * b.normal_x[i] + dy * b.normal_y[i] + dz * b.normal_z[i]);
+            const float square = dx * dx + dy * dy + dz * dz + 1e-12f;
+            const float facing =
+                (here > 0.0f ? here : 0.0f) * (there > 0.0f ? there : 0.0f) * b.area[i] / square;
+            const float form = facing / (square + b.area[i]);
+            near[0][i] += form;
+            near[1][i] += form * b.red[i];
+            near[2][i] += form * b.green[i];
+            near[3][i] += form * b.blue[i];
+            all[0][i] += facing;
+            all[1][i] += facing * b.red[i];
+            all[2][i] += facing * b.green[i];
+            all[3][i] += facing * b.blue[i];
+        }
+    const auto mean = [](const std::array<Lanes, 4>& sums) {
+        const auto sum = [&](std::size_t k) {
+            return std::accumulate(sums[k].begin(), sums[k].end(), 0.0f);
+        };
+        const float weight = sum(0);
+        return weight > 0.0f ? Rgb(sum(1), sum(2), sum(3)) / weight : Rgb(0.0f);
+    };
+    return mean(near) - mean(all);
+}
+
+}  // namespace insitu

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "core/color.h"
+
+#include <glm/glm.hpp>
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace insitu {
+
+/// Radiance of points all over the objects, for places so close to them that the objects' mean
+/// radiance is not what they see: in the hollow of an armchair, on the floor under a seat.
+class ObjectGlow {
+public:
+    /// A point's surface looks along its normal and stands for an area.
+    void add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb radiance);
+
+    /// Mean radiance of the points that face the place and lie above its horizon, near ones
+    /// weighted as their form factor, less the mean without regard to distance: 0 far away. What
+    /// points hide each other from the place is not looked at.
+    [[nodiscard]] Rgb excess(glm::dvec3 place, glm::dvec3 unit_normal) const;
+
+private:
+    static constexpr std::size_t kLanes = 16;
+    using Lanes = std::array<float, kLanes>;
+    /// As many points as are worked on at a time; unused ones have no area.
+    struct Bundle {
+        Lanes x{}, y{}, z{}, normal_x{}, normal_y{}, normal_z{}, area{}, red{}, green{}, blue{};
+    };
+    std::vector<Bundle> bundles_;
+    std::size_t count_ = 0;
+};
+
+}  // namespace insitu
