@@ -21,12 +21,14 @@ void ObjectGlow::add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb ra
     b.blue[lane] = radiance.b;
 }
 
-Rgb ObjectGlow::excess(glm::dvec3 place, glm::dvec3 unit_normal) const
-{
-    const glm::vec3 x(place);
-    const glm::vec3 n(unit_normal);
-    // Weight, red, green and blue of the mean by form factors and of the one without distance.
+/// Weight, red, green and blue of the mean by form factors and of the one without distance.
+struct ObjectGlow::Sums {
     std::array<Lanes, 4> near{}, all{};
+};
+
+// Lane by lane, so that the order of sums does not depend on a vector's width.
+INSITU_KERNEL void ObjectGlow::sum(glm::vec3 x, glm::vec3 n, Sums& sums) const
+{
     for (const Bundle& b : bundles_)
         for (std::size_t i = 0; i < kLanes; ++i) {
             const float dx = b.x[i] - x.x;
@@ -38,23 +40,55 @@ Rgb ObjectGlow::excess(glm::dvec3 place, glm::dvec3 unit_normal) const
             const float facing =
                 (here > 0.0f ? here : 0.0f) * (there > 0.0f ? there : 0.0f) * b.area[i] / square;
             const float form = facing / (square + b.area[i]);
-            near[0][i] += form;
-            near[1][i] += form * b.red[i];
-            near[2][i] += form * b.green[i];
-            near[3][i] += form * b.blue[i];
-            all[0][i] += facing;
-            all[1][i] += facing * b.red[i];
-            all[2][i] += facing * b.green[i];
-            all[3][i] += facing * b.blue[i];
+            sums.near[0][i] += form;
+            sums.near[1][i] += form * b.red[i];
+            sums.near[2][i] += form * b.green[i];
+            sums.near[3][i] += form * b.blue[i];
+            sums.all[0][i] += facing;
+            sums.all[1][i] += facing * b.red[i];
+            sums.all[2][i] += facing * b.green[i];
+            sums.all[3][i] += facing * b.blue[i];
         }
-    const auto mean = [](const std::array<Lanes, 4>& sums) {
-        const auto sum = [&](std::size_t k) {
-            return std::accumulate(sums[k].begin(), sums[k].end(), 0.0f);
+}
+
+#if defined(__x86_64__)
+INSITU_TARGET_AVX2 void ObjectGlow::sumAvx2(glm::vec3 x, glm::vec3 n, Sums& sums) const
+{
+    sum(x, n, sums);
+}
+
+INSITU_TARGET_AVX512 void ObjectGlow::sumAvx512(glm::vec3 x, glm::vec3 n, Sums& sums) const
+{
+    sum(x, n, sums);
+}
+#endif
+
+Rgb ObjectGlow::excess(glm::dvec3 place, glm::dvec3 unit_normal) const
+{
+    return excess(bestInstructionSet(), place, unit_normal);
+}
+
+Rgb ObjectGlow::excess(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const
+{
+    const glm::vec3 x(place);
+    const glm::vec3 n(unit_normal);
+    Sums sums;
+#if defined(__x86_64__)
+    if (isa == InstructionSet::Avx512)
+        sumAvx512(x, n, sums);
+    else if (isa == InstructionSet::Avx2)
+        sumAvx2(x, n, sums);
+    else
+#endif
+        sum(x, n, sums);
+    const auto mean = [](const std::array<Lanes, 4>& of) {
+        const auto total = [&](std::size_t k) {
+            return std::accumulate(of[k].begin(), of[k].end(), 0.0f);
         };
-        const float weight = sum(0);
-        return weight > 0.0f ? Rgb(sum(1), sum(2), sum(3)) / weight : Rgb(0.0f);
+        const float weight = total(0);
+        return weight > 0.0f ? Rgb(total(1), total(2), total(3)) / weight : Rgb(0.0f);
     };
-    return mean(near) - mean(all);
+    return mean(sums.near) - mean(sums.all);
 }
 
 }  // namespace insitu

@@ -371,6 +371,24 @@ TEST(ObjectGlow, WeighsWhatIsNearByItsFormFactor)
     EXPECT_NEAR(glow.excess({0.0, -1000.0, 0.0}, up).g, 0.0, 0.01);
 }
 
+TEST(ObjectGlow, EveryInstructionSetGivesTheSameBytes)
+{
+    ObjectGlow glow;
+    for (int i = 0; i < 77; ++i) {
+        const glm::dvec3 p(std::sin(3.0 * i), 0.5 + 0.4 * std::cos(5.0 * i), std::sin(7.0 * i));
+        glow.add(
+            p, -glm::normalize(p), 0.01 + 0.001 * i, Rgb(0.1f * static_cast<float>(i), 1.0f, 0.5f));
+    }
+    const glm::dvec3 up(0.0, 1.0, 0.0);
+    for (const double x : {-0.5, 0.0, 0.7}) {
+        const Rgb base = glow.excess(InstructionSet::Base, {x, 0.0, 0.1}, up);
+        EXPECT_NE(base, Rgb(0.0f));
+        for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa)
+            EXPECT_EQ(glow.excess(static_cast<InstructionSet>(isa), {x, 0.0, 0.1}, up), base)
+                << isa;
+    }
+}
+
 TEST(PlaceLight, SeesTheFurnaceAndItsChange)
 {
     const SceneProxy proxy(closedRoom());
