@@ -1,7 +1,8 @@
 // Global, local and selective tone mapping side by side: speed and error in one run, the tables 12
 // to 16 of [Michael10] for our operators.
 //
-//   tonemap [--runs N] [--threshold T] [--saliency] PICTURE[@MEGAPIXELS]…
+//   tonemap [--runs N] [--threshold T] [--saliency] [--inserted SHARE] PICTURE[@MEGAPIXELS]…
+//   tonemap --histogram [--threads N] PICTURE[@MEGAPIXELS]…
 //
 // Pictures are .exr, .hdr or .pfm; with @MEGAPIXELS resampled to that size first (by area, or cubic
 // where it grows). Times are processor seconds of one thread, the least of N runs, without reading
@@ -10,6 +11,7 @@
 // pictures above 6 megapixels in their middle 2048x2048 pixels. Below 3 megapixels the local
 // operator is also compared with its direct evaluation.
 #include "composite/tonemap/ashikhmin.h"
+#include "composite/tonemap/histogram_adjustment.h"
 #include "composite/tonemap/selective.h"
 #include "core/io/image_io.h"
 #include "core/parallel.h"
@@ -21,6 +23,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/saliency.hpp>
 
+#include <chrono>
 #include <ctime>
 #include <iostream>
 
@@ -179,8 +182,75 @@ struct BenchOptions {
     int runs = 5;
     double threshold = SelectiveOptions{}.importance_threshold;
     bool saliency = false;
+    double inserted = 0.0;
+    bool histogram = false;
+    int threads = 0;
     std::vector<std::string> pictures;
 };
+
+void benchInserted(const BenchOptions& options,
+                   const Image<Rgb>& scene,
+                   const SceneStatistics& statistics,
+                   const std::shared_ptr<const SeparableOperator>& tone_map,
+                   double local_seconds)
+{
+    Progress silent;
+    SelectiveOptions selection;
+    selection.importance = Image<float>(scene.width(), scene.height(), 0.0f);
+    selection.always = selection.importance;
+    const double side = std::sqrt(options.inserted);
+    const auto inside = [&](int i, int size) {
+        return std::abs((i + 0.5) / size - 0.5) < 0.5 * side;
+    };
+    for (int y = 0; y < scene.height(); ++y)
+        for (int x = 0; x < scene.width(); ++x)
+            if (inside(x, scene.width()) && inside(y, scene.height()))
+                selection.always(x, y) = 1.0f;
+    const auto selective = makeSelective(tone_map, selection);
+    Image<Rgb> display(scene.width(), scene.height());
+    const double seconds =
+        leastSeconds(options.runs, [&] { selective->mapInto(display, scene, statistics, silent); });
+    std::cout << fmt::format("  object of {:.1f} % alone: selected {:.1f} %, {:.2f} times LTM\n",
+                             100.0 * options.inserted,
+                             100.0 * selectedShare(*tone_map, selection, scene),
+                             local_seconds / seconds);
+}
+
+void benchHistogram(const BenchOptions& options, const std::string& argument)
+{
+    Progress silent;
+    const Image<Rgb> scene = readPicture(argument);
+    const SceneStatistics statistics = measureScene(scene);
+    Image<Rgb> display(scene.width(), scene.height());
+    std::cout << fmt::format("{}, {}x{}\n", argument, scene.width(), scene.height());
+    for (const double field : {40.0, 90.0, 150.0})
+        for (const double light : {30.0, 0.03}) {
+            HistogramAdjustmentOptions histogram;
+            histogram.field_of_view_deg = field;
+            histogram.viewing.scene_white_cd_m2 = light / statistics.log_average;
+            const auto tone_map = makeHistogramAdjustment(histogram);
+            double least = 1e300;
+            double processor = 1e300;
+            for (int i = 0; i < options.runs; ++i) {
+                const double start = processorSeconds();
+                const auto clock = std::chrono::steady_clock::now();
+                tone_map->mapInto(display, scene, statistics, silent);
+                const std::chrono::duration<double> taken =
+                    std::chrono::steady_clock::now() - clock;
+                least = std::min(least, taken.count());
+                processor = std::min(processor, processorSeconds() - start);
+            }
+            std::cout << fmt::format(
+                "  {:3.0f} degrees, log average {} cd/m²: {:.1f} frames/s by the clock, {:.1f} ms "
+                "of "
+                "processors\n",
+                field,
+                light,
+                1.0 / least,
+                1e3 * processor);
+        }
+    std::cout << std::flush;
+}
 
 void benchPicture(const BenchOptions& options, const std::string& argument)
 {
@@ -229,6 +299,9 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
         selective_errors.vdp_percent,
         1.0 / (selective_seconds * std::max(selective_errors.vdp_percent, 0.01)));
     if (scene.pixelCount() < 3'000'000) compareWithDirect(scene, ltm);
+    if (options.inserted > 0.0)
+        benchInserted(options, scene, statistics, operator_whole, local_seconds);
+    std::cout << std::flush;
     if (!options.saliency) return;
     SelectiveOptions by_map = selection;
     by_map.importance = saliencyOf(gtm);
@@ -251,8 +324,16 @@ int main(int argc, char** argv)
     app.add_option("--threshold", options.threshold, "Importance threshold");
     app.add_flag("--saliency", options.saliency, "Also selection by a saliency map");
     app.add_option("picture", options.pictures, "FILE or FILE@MEGAPIXELS")->required();
+    app.add_option("--inserted", options.inserted, "Also an object of this share of the picture");
+    app.add_flag("--histogram", options.histogram, "Histogram adjustment in place of all else");
+    app.add_option("--threads", options.threads, "Threads of --histogram; 0: all");
     CLI11_PARSE(app, argc, argv);
-    insitu::setThreadCount(1);
+    insitu::setThreadCount(options.histogram ? options.threads : 1);
+    if (options.histogram) {
+        for (const std::string& picture : options.pictures)
+            insitu::benchHistogram(options, picture);
+        return 0;
+    }
     for (const std::string& picture : options.pictures)
         insitu::benchPicture(options, picture);
     return 0;

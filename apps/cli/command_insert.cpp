@@ -1,4 +1,5 @@
 #include "apps/cli/command.h"
+#include "apps/cli/tonemap_options.h"
 #include "core/io/image_io.h"
 #include "pipeline/report.h"
 #include "pipeline/stage_cache.h"
@@ -13,6 +14,8 @@ struct InsertArguments {
     std::filesystem::path project;
     std::filesystem::path output;
     std::filesystem::path hdr;
+    std::filesystem::path tonemapped;
+    TonemapOptions tone;
     std::filesystem::path layers;
     std::filesystem::path report;
     Technique technique = Technique::Reference;
@@ -24,10 +27,37 @@ struct InsertArguments {
     InsertOptions options;
 };
 
-void runInsert(InsertArguments& arguments, Context& context)
+/// 1 where the composite's codes are no longer those of the photograph: objects and their shadows.
+Image<float> changedPixels(const InsertResult& result)
+{
+    const EncodedImage& before = result.photo.image;
+    const EncodedImage& after = result.composite.image;
+    Image<float> changed(after.codes.width(), after.codes.height(), 1.0f);
+    if (before.max_code != after.max_code) return changed;
+    for (std::size_t i = 0; i < changed.pixelCount(); ++i)
+        if (before.codes.pixels()[i] == after.codes.pixels()[i]) changed.pixels()[i] = 0.0f;
+    return changed;
+}
+
+void writeTonemapped(const InsertArguments& arguments,
+                     const CLI::App& command,
+                     const InsertResult& result,
+                     Context& context)
+{
+    const auto tone_map = arguments.tone.make(command, changedPixels(result));
+    writeEncoded(arguments.tonemapped,
+                 encodeSrgb(tone_map->map(result.composite.linear, context.progress()),
+                            result.composite.image.max_code));
+}
+
+void runInsert(InsertArguments& arguments, const CLI::App& command, Context& context)
 {
     context.start();
-    for (const auto& path : {arguments.output, arguments.hdr, arguments.layers, arguments.report})
+    for (const auto& path : {arguments.output,
+                             arguments.hdr,
+                             arguments.tonemapped,
+                             arguments.layers,
+                             arguments.report})
         if (!path.empty()) context.checkOutput(path);
 
     InsertOptions& options = arguments.options;
@@ -47,6 +77,8 @@ void runInsert(InsertArguments& arguments, Context& context)
     else if (options.cache_folder.empty())
         options.cache_folder = StageCache::userFolder().value_or("");
 
+    // Wrong flags are told before the work, not after it.
+    if (!arguments.tonemapped.empty()) (void)arguments.tone.make(command);
     const Project project = readProject(arguments.project);
     const InsertResult result = insertObjects(project, options, context.progress());
     context.print(result.findings);
@@ -56,6 +88,7 @@ void runInsert(InsertArguments& arguments, Context& context)
     writeEncoded(
         arguments.output, result.composite.image, metadata.exif, kJpegQuality, metadata.icc);
     if (!arguments.hdr.empty()) writeRadiance(arguments.hdr, result.composite.linear);
+    if (!arguments.tonemapped.empty()) writeTonemapped(arguments, command, result, context);
     if (!arguments.layers.empty()) writeLayers(arguments.layers, result);
     if (!arguments.report.empty())
         writeReport(arguments.report, project, options, result, arguments.output);
@@ -73,6 +106,10 @@ void registerInsert(CLI::App& app, Context& context)
     command->add_option("-o,--output", arguments->output, "Picture to write (.png, .jpg)")
         ->required();
     command->add_option("--hdr", arguments->hdr, "Also write the linear composite (.exr, .hdr)");
+    command->add_option("--tonemapped",
+                        arguments->tonemapped,
+                        "Also write the linear composite mapped for a display (.png, .jpg), by the "
+                        "tone mapping flags; selective: objects and shadows always count");
     command->add_option("--layers", arguments->layers, "Also write all layers (.exr)");
     command->add_option("--report", arguments->report, "Also write findings and figures (.json)");
     command
@@ -128,13 +165,15 @@ void registerInsert(CLI::App& app, Context& context)
                         "Folder in which the results of stages are kept for the next run "
                         "(default: $INSITU_CACHE, or insitu/ in the user's cache folder)");
     command->add_flag("--no-cache", arguments->no_cache, "Neither use nor keep results of stages");
+    arguments->tone.addTo(*command);
     context.addCommonOptions(*command);
     command->footer(
         "Examples:\n"
         "  insitu insert project.json -o final.png --technique auto --max-error 0.03\n"
         "  insitu insert project.json -o final.png --hdr final.exr --report report.json "
-        "--max-error 0.002");
-    command->callback([arguments, &context] { runInsert(*arguments, context); });
+        "--max-error 0.002\n"
+        "  insitu insert project.json -o final.png --tonemapped view.png --operator ashikhmin");
+    command->callback([arguments, command, &context] { runInsert(*arguments, *command, context); });
 }
 
 }  // namespace insitu::cli

@@ -51,6 +51,7 @@ Image<float> readMap(const std::filesystem::path& path)
 
 void TonemapOptions::addTo(CLI::App& command)
 {
+    const std::size_t others = command.get_options().size();
     command
         .add_option("--operator",
                     name_,
@@ -121,6 +122,9 @@ void TonemapOptions::addTo(CLI::App& command)
                        "Picture to take importance from in place of the gradient (selective)");
     command.add_option(
         "--always", always_, "Picture, white where the local part always counts (selective)");
+    const std::vector<CLI::Option*> options = command.get_options();
+    for (std::size_t i = others; i < options.size(); ++i)
+        options[i]->group("Tone mapping");
 }
 
 std::unique_ptr<SeparableOperator> TonemapOptions::makeSeparable(const std::string& name) const
@@ -131,7 +135,8 @@ std::unique_ptr<SeparableOperator> TonemapOptions::makeSeparable(const std::stri
     return makeAshikhmin(options);
 }
 
-std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command) const
+std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command,
+                                                      const Image<float>& always) const
 {
     const bool selective = name_ == "selective";
     for (const FlagUse& use : flagUses()) {
@@ -154,6 +159,10 @@ std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command) c
     options.importance_threshold = importance_threshold_;
     options.importance = readMap(importance_);
     options.always = readMap(always_);
+    if (options.always.empty()) options.always = always;
+    if (options.always.sameSize(always))
+        for (std::size_t i = 0; i < always.pixelCount(); ++i)
+            options.always.pixels()[i] = std::max(options.always.pixels()[i], always.pixels()[i]);
     return makeSelective(makeSeparable(selected_), std::move(options));
 }
 

@@ -16,11 +16,13 @@ namespace insitu::cli {
 /// Flags that choose and tune a tone mapping operator, shared by the commands that map tones.
 class TonemapOptions {
 public:
-    /// Adds the flags to a subcommand; this object must outlive it.
+    /// Adds the flags to a subcommand, as a group of its help; this object must outlive it.
     void addTo(CLI::App& command);
     /// The operator that the flags ask for. Reads maps. CLI::ValidationError for a flag that the
     /// operator does not have, InputError for bad values and files.
-    [[nodiscard]] std::unique_ptr<ToneMapOperator> make(const CLI::App& command) const;
+    /// `always`, when not empty, counts besides what the flags name (selective).
+    [[nodiscard]] std::unique_ptr<ToneMapOperator> make(const CLI::App& command,
+                                                        const Image<float>& always = {}) const;
     /// False when the operator makes its curve from the picture alone.
     [[nodiscard]] bool sharesCurves() const { return name_ != "histogram"; }
 

@@ -59,15 +59,16 @@ Rgb coveredMean(const Cover& cover, std::size_t cell, const Get& get)
 cv::Mat kernelSpectrum(const cv::Size& size)
 {
     cv::Mat kernel(size, CV_32FC2);
-    for (int y = 0; y < size.height; ++y)
+    parallelFor(0, size.height, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
         for (int x = 0; x < size.width; ++x) {
             const double degrees =
                 std::hypot(std::min(x, size.width - x), std::min(y, size.height - y));
-            const double angle = degrees * kDegree;
             const bool counts = degrees > 0.0 && degrees < 90.0;
-            kernel.at<cv::Vec2f>(y, x) = {
-                counts ? static_cast<float>(std::cos(angle) / (degrees * degrees)) : 0.0f, 0.0f};
+            const double weight = counts ? std::cos(degrees * kDegree) / (degrees * degrees) : 0.0;
+            kernel.at<cv::Vec2f>(y, x) = {static_cast<float>(weight), 0.0f};
         }
+    });
     cv::dft(kernel, kernel);
     return kernel;
 }
@@ -114,7 +115,6 @@ Image<Rgb> veilingLuminance(const Image<Rgb>& foveal)
         return cv::getOptimalDFTSize(pixels + std::min(pixels, 90));
     };
     const cv::Size size(padded(foveal.width()), padded(foveal.height()));
-    const cv::Mat kernel = kernelSpectrum(size);
     // Two real images in each complex one: red and green, blue and the sum of the weights. The
     // latter in the picture's own unit, so that rounding does not carry it over.
     double light = 0.0;
@@ -123,6 +123,7 @@ Image<Rgb> veilingLuminance(const Image<Rgb>& foveal)
     if (light == 0.0) return Image<Rgb>(foveal.width(), foveal.height(), Rgb(0.0f));
     const auto unit = static_cast<float>(light / (3.0 * static_cast<double>(foveal.pixelCount())));
     std::array<cv::Mat, 2> planes;
+    const cv::Mat kernel = kernelSpectrum(size);
     parallelFor(0, 2, [&](std::int64_t pair) {
         cv::Mat& plane = planes[static_cast<std::size_t>(pair)];
         plane = cv::Mat::zeros(size, CV_32FC2);

@@ -120,16 +120,20 @@ private:
         }
         // Equation 5.3: what the picture itself resolves in the middle, cycles per degree.
         const double resolved = 0.5 * scene.width() / options_.field_of_view_deg;
-        std::vector<float> adaptation;
-        adaptation.reserve(foveal.pixelCount());
-        for (std::size_t i = 0; i < foveal.pixelCount(); ++i) {
-            adaptation.push_back(luminance(foveal.pixels()[i]));
-            if (!options_.acuity) continue;
-            const double level =
-                std::log2(resolved / acuity(static_cast<double>(adaptation.back())));
-            observer.places.pixels()[i].level = static_cast<float>(std::max(0.0, level));
-            observer.deepest = std::max(observer.deepest, observer.places.pixels()[i].level);
-        }
+        std::vector<float> adaptation(foveal.pixelCount());
+        parallelFor(0, foveal.height(), [&](std::int64_t row) {
+            for (int x = 0; x < foveal.width(); ++x) {
+                const int y = static_cast<int>(row);
+                const float light = luminance(foveal(x, y));
+                adaptation[static_cast<std::size_t>(y) * static_cast<std::size_t>(foveal.width()) +
+                           static_cast<std::size_t>(x)] = light;
+                if (!options_.acuity) continue;
+                const double level = std::log2(resolved / acuity(static_cast<double>(light)));
+                observer.places(x, y).level = static_cast<float>(std::max(0.0, level));
+            }
+        });
+        for (const Place& place : observer.places.pixels())
+            observer.deepest = std::max(observer.deepest, place.level);
         observer.curve = tonemap::histogramCurve(
             adaptation, options_.display_black_cd_m2, options_.viewing.display_white_cd_m2);
         return observer;

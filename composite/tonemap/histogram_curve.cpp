@@ -1,7 +1,9 @@
 #include "composite/tonemap/histogram_curve.h"
 
 #include "composite/tonemap/eye_model.h"
+#include "composite/tonemap/line_steps.h"
 #include "core/check.h"
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -33,24 +35,31 @@ struct Histogram {
     }
 };
 
-Histogram countBrightness(const std::vector<float>& adaptation)
+/// Natural logarithms, none below the eye's floor.
+std::vector<float> brightnessOf(const std::vector<float>& adaptation)
 {
-    double least = std::log(kLeastLuminance);
-    double most = least;
-    bool first = true;
-    std::vector<double> logs;
-    logs.reserve(adaptation.size());
-    for (const float value : adaptation) {
-        logs.push_back(std::log(std::max(static_cast<double>(value), kLeastLuminance)));
-        least = first ? logs.back() : std::min(least, logs.back());
-        most = first ? logs.back() : std::max(most, logs.back());
-        first = false;
-    }
+    constexpr std::int64_t kBlock = 4096;
+    const auto count = static_cast<std::int64_t>(adaptation.size());
+    std::vector<float> logs(adaptation.size());
+    parallelFor(0, (count + kBlock - 1) / kBlock, [&](std::int64_t block) {
+        for (std::int64_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) {
+            const auto at = static_cast<std::size_t>(i);
+            logs[at] = logOf(std::max(adaptation[at], static_cast<float>(kLeastLuminance)));
+        }
+    });
+    return logs;
+}
+
+Histogram countBrightness(const std::vector<float>& logs)
+{
+    const auto [least, most] = std::minmax_element(logs.begin(), logs.end());
     Histogram histogram;
-    histogram.log_first = least;
-    histogram.step = std::max((most - least) / static_cast<double>(kBins), 1e-9);
-    for (const double log : logs) {
-        const auto bin = static_cast<std::size_t>((log - least) / histogram.step);
+    histogram.log_first = static_cast<double>(*least);
+    histogram.step =
+        std::max(static_cast<double>(*most - *least) / static_cast<double>(kBins), 1e-9);
+    for (const float log : logs) {
+        const auto bin = static_cast<std::size_t>((static_cast<double>(log) - histogram.log_first) /
+                                                  histogram.step);
         histogram.counts[std::min(bin, kBins - 1)] += 1.0;
     }
     return histogram;
@@ -105,10 +114,11 @@ bool adjust(Histogram& histogram, double black, double white)
 HistogramCurve histogramCurve(const std::vector<float>& adaptation, double black, double white)
 {
     INSITU_CHECK(!adaptation.empty() && 0.0 < black && black < white, "{} to {}", black, white);
-    Histogram histogram = countBrightness(adaptation);
+    const std::vector<float> logs = brightnessOf(adaptation);
+    Histogram histogram = countBrightness(logs);
     double log_sum = 0.0;
-    for (const float value : adaptation)
-        log_sum += std::log(std::max(static_cast<double>(value), kLeastLuminance));
+    for (const float log : logs)
+        log_sum += static_cast<double>(log);
     const double scene_level = std::exp(log_sum / static_cast<double>(adaptation.size()));
     const double log_most = histogram.log_first + histogram.step * kBins;
     // What just can be told apart in the scene is what just can be told apart on the display.

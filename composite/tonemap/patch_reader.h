@@ -7,7 +7,7 @@ namespace insitu::tonemap {
 
 /// Tiles that a picture is cut into: large, since what surrounds a tile is filtered with it.
 constexpr int kTileWidth = 512;
-constexpr int kTileHeight = 256;
+constexpr int kTileHeight = 512;
 
 /// The part of the picture that starts at (x0, y0), multiples of 4, luminance times `scale`.
 /// The tile is width x height or what is left of the picture, filled up to multiples of 4.

@@ -3,6 +3,7 @@
 #include "composite/tonemap/importance_cells.h"
 #include "composite/tonemap/patch_reader.h"
 #include "composite/tonemap/tile_map.h"
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,31 +14,46 @@ namespace {
 
 using tonemap::Cells;
 
-/// Marks cells with a pixel of the map above the threshold, weighted by the map where asked.
-void markFromMap(
-    const Image<float>& map, float threshold, bool weighted, int x0, int y0, Cells& cells)
+/// Largest value of a map in each cell; empty for an empty map.
+Image<float> cellPeaks(const Image<float>& map)
 {
-    const auto lastCell = [](int pixels) { return (pixels + Cells::kSize - 1) / Cells::kSize; };
-    const int cell_x0 = x0 / Cells::kSize;
-    const int cell_y0 = y0 / Cells::kSize;
-    for (int row = -Cells::kMargin; row < cells.rows + Cells::kMargin; ++row)
-        for (int column = -Cells::kMargin; column < cells.columns + Cells::kMargin; ++column) {
-            const int cx = std::clamp(cell_x0 + column, 0, lastCell(map.width()) - 1);
-            const int cy = std::clamp(cell_y0 + row, 0, lastCell(map.height()) - 1);
-            float largest = 0.0f;
-            for (int y = cy * Cells::kSize; y < std::min((cy + 1) * Cells::kSize, map.height());
-                 ++y)
-                for (int x = cx * Cells::kSize; x < std::min((cx + 1) * Cells::kSize, map.width());
-                     ++x)
-                    largest = std::max(largest, map(x, y));
-            float& cell = cells.row(row)[column];
-            if (largest > threshold) cell = std::max(cell, weighted ? largest : 1.0f);
+    const auto cellsOf = [](int pixels) { return (pixels + Cells::kSize - 1) / Cells::kSize; };
+    Image<float> peaks(cellsOf(map.width()), cellsOf(map.height()), 0.0f);
+    parallelFor(0, peaks.height(), [&](std::int64_t row) {
+        const auto line = peaks.row(static_cast<int>(row));
+        const int top = static_cast<int>(row) * Cells::kSize;
+        for (int y = top; y < std::min(top + Cells::kSize, map.height()); ++y) {
+            const auto values = map.row(y);
+            for (std::size_t x = 0; x < values.size(); ++x)
+                line[x / Cells::kSize] = std::max(line[x / Cells::kSize], values[x]);
         }
+    });
+    return peaks;
+}
+
+/// Marks a tile's cells whose peak is above the threshold, with 1 or, where asked, with the peak.
+void markPeaks(
+    const Image<float>& peaks, float threshold, bool weighted, int x0, int y0, Cells& cells)
+{
+    for (int row = -Cells::kMargin; row < cells.rows + Cells::kMargin; ++row) {
+        const auto line = peaks.row(std::clamp(y0 / Cells::kSize + row, 0, peaks.height() - 1));
+        float* const cell = cells.row(row);
+        for (int column = -Cells::kMargin; column < cells.columns + Cells::kMargin; ++column) {
+            const float peak = line[static_cast<std::size_t>(
+                std::clamp(x0 / Cells::kSize + column, 0, peaks.width() - 1))];
+            if (peak > threshold) cell[column] = std::max(cell[column], weighted ? peak : 1.0f);
+        }
+    }
 }
 
 class SelectedPixels : public tonemap::Importance {
 public:
-    explicit SelectedPixels(const SelectiveOptions& options) : options_(options) {}
+    explicit SelectedPixels(const SelectiveOptions& options)
+        : threshold_(static_cast<float>(options.importance_threshold)),
+          importance_(cellPeaks(options.importance)),
+          always_(cellPeaks(options.always))
+    {
+    }
 
     [[nodiscard]] int halo() const override { return Cells::kHalo; }
 
@@ -48,18 +64,33 @@ public:
                        float* weights) const override
     {
         Cells cells(patch.width / Cells::kSize, patch.height / Cells::kSize);
-        const auto threshold = static_cast<float>(options_.importance_threshold);
-        if (options_.importance.empty())
-            tonemap::markEdges(patch, threshold, cells);
+        if (importance_.empty())
+            tonemap::markEdges(patch, threshold_, cells);
         else
-            markFromMap(options_.importance, threshold, false, x0, y0, cells);
-        if (!options_.always.empty()) markFromMap(options_.always, 0.0f, true, x0, y0, cells);
+            markPeaks(importance_, threshold_, false, x0, y0, cells);
+        if (!always_.empty()) markPeaks(always_, 0.0f, true, x0, y0, cells);
+        // Plain tiles, important or not, need neither spreading nor blending.
+        const auto all = [&](float value) {
+            return std::all_of(cells.values.begin(), cells.values.end(), [&](float cell) {
+                return cell == value;
+            });
+        };
+        if (all(0.0f)) return tonemap::uniformBlocks(patch, 0);
+        if (all(1.0f)) {
+            std::fill_n(
+                weights,
+                static_cast<std::size_t>(patch.width) * static_cast<std::size_t>(patch.height),
+                1.0f);
+            return tonemap::uniformBlocks(patch, 1);
+        }
         tonemap::spreadCells(cells);
         return tonemap::weighPixels(cells, patch.width, patch.height, weights);
     }
 
 private:
-    const SelectiveOptions& options_;
+    float threshold_;
+    Image<float> importance_;  ///< peaks by cells
+    Image<float> always_;
 };
 
 void requireSize(const Image<float>& map, const Image<Rgb>& scene, const char* name)
@@ -77,7 +108,7 @@ void requireSize(const Image<float>& map, const Image<Rgb>& scene, const char* n
 class Selective : public ToneMapOperator {
 public:
     Selective(std::shared_ptr<const SeparableOperator> tone_map, SelectiveOptions options)
-        : tone_map_(std::move(tone_map)), options_(std::move(options))
+        : tone_map_(std::move(tone_map)), options_(std::move(options)), selected_(options_)
     {
     }
 
@@ -90,14 +121,14 @@ public:
         requireSize(options_.importance, scene, "importance map");
         const auto curve = tone_map_->curve(statistics);
         const auto local = tone_map_->local();
-        const SelectedPixels selected(options_);
         tonemap::mapTiles(
-            scene, *curve, local.get(), local ? &selected : nullptr, display, progress);
+            scene, *curve, local.get(), local ? &selected_ : nullptr, display, progress);
     }
 
 private:
     std::shared_ptr<const SeparableOperator> tone_map_;
     SelectiveOptions options_;
+    SelectedPixels selected_;  ///< maps are gathered once, for all frames
 };
 
 }  // namespace

@@ -7,34 +7,106 @@
 
 namespace insitu::tonemap {
 
-namespace {
-
-WantedBlocks allBlocks(const LuminancePatch& patch)
+WantedBlocks uniformBlocks(const LuminancePatch& patch, std::uint8_t wanted)
 {
     const auto parts = [](int pixels, int size) { return (pixels + size - 1) / size; };
     WantedBlocks blocks;
     blocks.columns = parts(patch.width, WantedBlocks::kWidth);
     blocks.wanted.assign(static_cast<std::size_t>(blocks.columns) *
                              static_cast<std::size_t>(parts(patch.height, WantedBlocks::kHeight)),
-                         1);
+                         wanted);
     return blocks;
 }
 
-/// What a tile's pixels adapt to, rows with even columns first.
-std::vector<float> adaptTile(const LuminancePatch& patch,
-                             const ToneCurve& curve,
-                             const LocalAdaptation& local,
-                             const Importance* importance,
-                             int x0,
-                             int y0)
+namespace {
+
+/// The rectangle of blocks that holds all wanted ones.
+struct BlockBox {
+    int left, top, right, bottom;  ///< the last two are outside
+};
+
+BlockBox boxOf(const WantedBlocks& blocks)
+{
+    const int rows = static_cast<int>(blocks.wanted.size()) / blocks.columns;
+    BlockBox box{blocks.columns, rows, 0, 0};
+    for (int y = 0; y < rows; ++y)
+        for (int x = 0; x < blocks.columns; ++x) {
+            if (blocks.wanted[static_cast<std::size_t>(y * blocks.columns + x)] == 0) continue;
+            box = {std::min(box.left, x),
+                   std::min(box.top, y),
+                   std::max(box.right, x + 1),
+                   std::max(box.bottom, y + 1)};
+        }
+    return box;
+}
+
+WantedBlocks cutBlocks(const WantedBlocks& blocks, const BlockBox& box)
+{
+    WantedBlocks part;
+    part.columns = box.right - box.left;
+    for (int y = box.top; y < box.bottom; ++y)
+        for (int x = box.left; x < box.right; ++x)
+            part.wanted.push_back(blocks.wanted[static_cast<std::size_t>(y * blocks.columns + x)]);
+    return part;
+}
+
+/// A tile of the picture, and what it is mapped with.
+struct Tile {
+    const Image<Rgb>& scene;
+    const ToneCurve& curve;
+    int x0, y0;
+};
+
+/// Blends the local part in, where it is wanted; only there the picture is read as far around as
+/// the local part looks.
+void blendLocal(const Tile& tile,
+                const LuminancePatch& patch,
+                const LocalAdaptation& local,
+                const WantedBlocks& blocks,
+                const std::vector<float>& weights,
+                std::vector<float>& adapted)
+{
+    const BlockBox box = boxOf(blocks);
+    const int left = box.left * WantedBlocks::kWidth;
+    const int top = box.top * WantedBlocks::kHeight;
+    const LuminancePatch part =
+        readPatch(tile.scene,
+                  tile.x0 + left,
+                  tile.y0 + top,
+                  std::min(box.right * WantedBlocks::kWidth, patch.width) - left,
+                  std::min(box.bottom * WantedBlocks::kHeight, patch.height) - top,
+                  local.halo(),
+                  tile.curve.scale());
+    const std::ptrdiff_t part_half = part.width / 2;
+    const std::ptrdiff_t half = patch.width / 2;
+    // What is not wanted has no weight: any finite value will do.
+    std::vector<float> locally(static_cast<std::size_t>(part.width) *
+                               static_cast<std::size_t>(part.height));
+    local.adapt(part, cutBlocks(blocks, box), locally.data());
+    const auto blend = [&](std::ptrdiff_t to, std::ptrdiff_t from) {
+        const float* const weight = weights.data() + to;
+        const float* const value = locally.data() + from;
+        float* const out = adapted.data() + to;
+        for (std::ptrdiff_t i = 0; i < part_half; ++i)
+            out[i] = (1.0f - weight[i]) * out[i] + weight[i] * value[i];
+    };
+    for (int y = 0; y < part.height; ++y) {
+        const std::ptrdiff_t to = (top + y) * 2 * half + left / 2;
+        const std::ptrdiff_t from = y * 2 * part_half;
+        blend(to, from);
+        blend(to + half, from + part_half);
+    }
+}
+
+/// What a tile's pixels adapt to by importance, rows with even columns first.
+std::vector<float> adaptSelected(const Tile& tile,
+                                 const LuminancePatch& patch,
+                                 const LocalAdaptation& local,
+                                 const Importance& importance)
 {
     const std::size_t pixels =
         static_cast<std::size_t>(patch.width) * static_cast<std::size_t>(patch.height);
     std::vector<float> adapted(pixels);
-    if (importance == nullptr) {
-        local.adapt(patch, allBlocks(patch), adapted.data());
-        return adapted;
-    }
     const auto half = static_cast<std::size_t>(patch.width / 2);
     for (int y = 0; y < patch.height; ++y) {
         float* const row = adapted.data() + 2 * half * static_cast<std::size_t>(y);
@@ -42,47 +114,62 @@ std::vector<float> adaptTile(const LuminancePatch& patch,
         std::copy_n(patch.odd(y), half, row + half);
     }
     std::vector<float> weights(pixels, 0.0f);
-    const WantedBlocks blocks = importance->weigh(patch, curve, x0, y0, weights.data());
-    if (!blocks.any()) return adapted;
-    std::vector<float> locally = adapted;
-    local.adapt(patch, blocks, locally.data());
-    for (std::size_t i = 0; i < pixels; ++i)
-        adapted[i] = (1.0f - weights[i]) * adapted[i] + weights[i] * locally[i];
+    const WantedBlocks blocks =
+        importance.weigh(patch, tile.curve, tile.x0, tile.y0, weights.data());
+    if (blocks.any()) blendLocal(tile, patch, local, blocks, weights, adapted);
     return adapted;
 }
 
-void mapTile(const Image<Rgb>& scene,
-             const ToneCurve& curve,
-             const LocalAdaptation* local,
-             const Importance* importance,
-             int x0,
-             int y0,
-             Image<Rgb>& display)
+/// Curve and colours of a tile; `adapted` empty: each pixel adapts to itself.
+void writeTile(const Tile& tile,
+               const LuminancePatch& patch,
+               const std::vector<float>& adapted,
+               Image<Rgb>& display)
 {
-    const int halo = std::max(local != nullptr ? local->halo() : 0,
-                              importance != nullptr ? importance->halo() : 0);
-    const LuminancePatch patch =
-        readPatch(scene, x0, y0, kTileWidth, kTileHeight, halo, curve.scale());
     const auto half = static_cast<std::size_t>(patch.width / 2);
-    std::vector<float> adapted;
-    if (local != nullptr) adapted = adaptTile(patch, curve, *local, importance, x0, y0);
     std::vector<float> luminances(2 * half);
     std::vector<float> mapped(2 * half);
     std::vector<float> line;
-    const int width = std::min(kTileWidth, scene.width() - x0);
-    const int height = std::min(kTileHeight, scene.height() - y0);
+    const int width = std::min(kTileWidth, tile.scene.width() - tile.x0);
+    const int height = std::min(kTileHeight, tile.scene.height() - tile.y0);
     for (int y = 0; y < height; ++y) {
         std::copy_n(patch.even(y), half, luminances.data());
         std::copy_n(patch.odd(y), half, luminances.data() + half);
         const float* const adaptation =
-            local != nullptr ? adapted.data() + 2 * half * static_cast<std::size_t>(y)
-                             : luminances.data();
-        curve.apply(luminances.data(), adaptation, mapped.data(), patch.width);
-        const RowResult result{
-            luminances.data(), mapped.data(), curve.scale(), static_cast<std::ptrdiff_t>(half)};
-        writeRow(
-            scene.row(y0 + y).data() + x0, result, width, line, display.row(y0 + y).data() + x0);
+            adapted.empty() ? luminances.data()
+                            : adapted.data() + 2 * half * static_cast<std::size_t>(y);
+        tile.curve.apply(luminances.data(), adaptation, mapped.data(), patch.width);
+        const RowResult result{luminances.data(),
+                               mapped.data(),
+                               tile.curve.scale(),
+                               static_cast<std::ptrdiff_t>(half)};
+        writeRow(tile.scene.row(tile.y0 + y).data() + tile.x0,
+                 result,
+                 width,
+                 line,
+                 display.row(tile.y0 + y).data() + tile.x0);
     }
+}
+
+void mapTile(const Tile& tile,
+             const LocalAdaptation* local,
+             const Importance* importance,
+             Image<Rgb>& display)
+{
+    const int halo = importance != nullptr ? importance->halo()
+                     : local != nullptr    ? local->halo()
+                                           : 0;
+    const LuminancePatch patch =
+        readPatch(tile.scene, tile.x0, tile.y0, kTileWidth, kTileHeight, halo, tile.curve.scale());
+    std::vector<float> adapted;
+    if (local != nullptr && importance != nullptr) {
+        adapted = adaptSelected(tile, patch, *local, *importance);
+    } else if (local != nullptr) {
+        adapted.resize(static_cast<std::size_t>(patch.width) *
+                       static_cast<std::size_t>(patch.height));
+        local->adapt(patch, uniformBlocks(patch, 1), adapted.data());
+    }
+    writeTile(tile, patch, adapted, display);
 }
 
 }  // namespace
@@ -101,13 +188,11 @@ void mapTiles(const Image<Rgb>& scene,
     const int rows = (scene.height() + kTileHeight - 1) / kTileHeight;
     parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t tile) {
         if (progress.cancelled()) return;
-        mapTile(scene,
-                curve,
-                local,
-                importance,
-                static_cast<int>(tile % columns) * kTileWidth,
-                static_cast<int>(tile / columns) * kTileHeight,
-                display);
+        const Tile part{scene,
+                        curve,
+                        static_cast<int>(tile % columns) * kTileWidth,
+                        static_cast<int>(tile / columns) * kTileHeight};
+        mapTile(part, local, importance, display);
     });
     progress.checkpoint();
     progress.report("tone mapping", 1.0);

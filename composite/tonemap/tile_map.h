@@ -21,6 +21,9 @@ public:
                                float* weights) const = 0;
 };
 
+/// All of a tile's blocks alike: 1 wanted, 0 not.
+[[nodiscard]] WantedBlocks uniformBlocks(const LuminancePatch& patch, std::uint8_t wanted);
+
 /// Maps a picture tile by tile. `local` null: the global curve alone. `importance` null: the local
 /// part everywhere; else where it says, blended by its weights with the pixel's own luminance.
 void mapTiles(const Image<Rgb>& scene,

@@ -65,12 +65,21 @@ TEST_F(InsertProject, WritesPictureReportLayersAndRefusesToOverwrite)
 {
     const fs::path report = folder_ / "report.json";
     const fs::path layers = folder_ / "layers.exr";
-    const ProgramRun run =
-        insert({"--report", report.string(), "--layers", layers.string(), "--strict"});
+    const fs::path mapped = folder_ / "mapped.jpg";
+    const ProgramRun run = insert({"--report",
+                                   report.string(),
+                                   "--layers",
+                                   layers.string(),
+                                   "--tonemapped",
+                                   mapped.string(),
+                                   "--operator",
+                                   "selective",
+                                   "--strict"});
     // Whatever is told of the sample, none of it is a warning.
     EXPECT_EQ(run.exit_code, 0) << run.messages;
     EXPECT_TRUE(fs::exists(picture()));
     EXPECT_GT(fs::file_size(layers), 1000u);
+    EXPECT_GT(fs::file_size(mapped), 1000u);
     const Json told = readJsonFile(report);
     EXPECT_EQ(told["format"], "insitu-report");
     EXPECT_GT(told["composite"]["influence_fraction"].get<double>(), 0.0);
@@ -78,6 +87,20 @@ TEST_F(InsertProject, WritesPictureReportLayersAndRefusesToOverwrite)
     const ProgramRun again = insert();
     EXPECT_EQ(again.exit_code, 1);
     EXPECT_THAT(again.messages, HasSubstr("--force"));
+}
+
+// Told before the work: no picture is there yet.
+TEST_F(InsertProject, RefusesToneMappingFlagsThatDoNotFit)
+{
+    const ProgramRun run = insert({"--tonemapped",
+                                   (folder_ / "mapped.jpg").string(),
+                                   "--operator",
+                                   "ashikhmin",
+                                   "--key",
+                                   "1"});
+    EXPECT_EQ(run.exit_code, 2);
+    EXPECT_THAT(run.messages, HasSubstr("--key"));
+    EXPECT_TRUE(leftNothing());
 }
 
 TEST_F(InsertProject, ASecondRunFindsTheStagesOfTheFirst)
