@@ -119,12 +119,14 @@ LuminancePatch readPatch(
     patch.halo = halo;
     const int rows = patch.height + 2 * halo;
     const int columns = patch.width + 2 * halo;
-    patch.values.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    // Not initialised: all is written below.
+    patch.values.reset(
+        new float[static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)]);
     std::vector<float> line(static_cast<std::size_t>(columns));
     const InstructionSet set = bestInstructionSet();
     for (int row = 0; row < rows; ++row) {
         const int y = std::clamp(y0 - halo + row, 0, scene.height() - 1);
-        float* const even = patch.values.data() + row * patch.stride();
+        float* const even = patch.values.get() + row * patch.stride();
         readRow(set,
                 {scene.row(y).data(),
                  x0 - halo,

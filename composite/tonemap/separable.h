@@ -19,14 +19,14 @@ struct LuminancePatch {
     int width = 0;  ///< of the tile, without the halo
     int height = 0;
     int halo = 0;
-    std::vector<float> values;
+    std::unique_ptr<float[]> values;
 
     [[nodiscard]] std::ptrdiff_t half() const { return (width + 2 * halo) / 2; }
     [[nodiscard]] std::ptrdiff_t stride() const { return 2 * half(); }
     /// Even columns of a row in [-halo, height + halo), from x = 0.
     [[nodiscard]] const float* even(int y) const
     {
-        return values.data() + (y + halo) * stride() + halo / 2;
+        return values.get() + (y + halo) * stride() + halo / 2;
     }
     [[nodiscard]] const float* odd(int y) const { return even(y) + half(); }
 };

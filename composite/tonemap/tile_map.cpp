@@ -50,6 +50,9 @@ WantedBlocks cutBlocks(const WantedBlocks& blocks, const BlockBox& box)
     return part;
 }
 
+/// What a tile's pixels adapt to, rows with even columns first; not initialised when made.
+using Luminances = std::unique_ptr<float[]>;
+
 /// A tile of the picture, and what it is mapped with.
 struct Tile {
     const Image<Rgb>& scene;
@@ -64,7 +67,7 @@ void blendLocal(const Tile& tile,
                 const LocalAdaptation& local,
                 const WantedBlocks& blocks,
                 const std::vector<float>& weights,
-                std::vector<float>& adapted)
+                float* adapted)
 {
     const BlockBox box = boxOf(blocks);
     const int left = box.left * WantedBlocks::kWidth;
@@ -86,7 +89,7 @@ void blendLocal(const Tile& tile,
     const auto blend = [&](std::ptrdiff_t to, std::ptrdiff_t from) {
         const float* const weight = weights.data() + to;
         const float* const value = locally.data() + from;
-        float* const out = adapted.data() + to;
+        float* const out = adapted + to;
         for (std::ptrdiff_t i = 0; i < part_half; ++i)
             out[i] = (1.0f - weight[i]) * out[i] + weight[i] * value[i];
     };
@@ -98,32 +101,32 @@ void blendLocal(const Tile& tile,
     }
 }
 
-/// What a tile's pixels adapt to by importance, rows with even columns first.
-std::vector<float> adaptSelected(const Tile& tile,
-                                 const LuminancePatch& patch,
-                                 const LocalAdaptation& local,
-                                 const Importance& importance)
+/// What a tile's pixels adapt to by importance.
+Luminances adaptSelected(const Tile& tile,
+                         const LuminancePatch& patch,
+                         const LocalAdaptation& local,
+                         const Importance& importance)
 {
     const std::size_t pixels =
         static_cast<std::size_t>(patch.width) * static_cast<std::size_t>(patch.height);
-    std::vector<float> adapted(pixels);
+    Luminances adapted(new float[pixels]);
     const auto half = static_cast<std::size_t>(patch.width / 2);
     for (int y = 0; y < patch.height; ++y) {
-        float* const row = adapted.data() + 2 * half * static_cast<std::size_t>(y);
+        float* const row = adapted.get() + 2 * half * static_cast<std::size_t>(y);
         std::copy_n(patch.even(y), half, row);
         std::copy_n(patch.odd(y), half, row + half);
     }
     std::vector<float> weights(pixels, 0.0f);
     const WantedBlocks blocks =
         importance.weigh(patch, tile.curve, tile.x0, tile.y0, weights.data());
-    if (blocks.any()) blendLocal(tile, patch, local, blocks, weights, adapted);
+    if (blocks.any()) blendLocal(tile, patch, local, blocks, weights, adapted.get());
     return adapted;
 }
 
-/// Curve and colours of a tile; `adapted` empty: each pixel adapts to itself.
+/// Curve and colours of a tile; `adapted` null: each pixel adapts to itself.
 void writeTile(const Tile& tile,
                const LuminancePatch& patch,
-               const std::vector<float>& adapted,
+               const Luminances& adapted,
                Image<Rgb>& display)
 {
     const auto half = static_cast<std::size_t>(patch.width / 2);
@@ -136,8 +139,8 @@ void writeTile(const Tile& tile,
         std::copy_n(patch.even(y), half, luminances.data());
         std::copy_n(patch.odd(y), half, luminances.data() + half);
         const float* const adaptation =
-            adapted.empty() ? luminances.data()
-                            : adapted.data() + 2 * half * static_cast<std::size_t>(y);
+            adapted == nullptr ? luminances.data()
+                               : adapted.get() + 2 * half * static_cast<std::size_t>(y);
         tile.curve.apply(luminances.data(), adaptation, mapped.data(), patch.width);
         const RowResult result{luminances.data(),
                                mapped.data(),
@@ -161,13 +164,13 @@ void mapTile(const Tile& tile,
                                            : 0;
     const LuminancePatch patch =
         readPatch(tile.scene, tile.x0, tile.y0, kTileWidth, kTileHeight, halo, tile.curve.scale());
-    std::vector<float> adapted;
+    Luminances adapted;
     if (local != nullptr && importance != nullptr) {
         adapted = adaptSelected(tile, patch, *local, *importance);
     } else if (local != nullptr) {
-        adapted.resize(static_cast<std::size_t>(patch.width) *
-                       static_cast<std::size_t>(patch.height));
-        local->adapt(patch, uniformBlocks(patch, 1), adapted.data());
+        adapted.reset(new float[static_cast<std::size_t>(patch.width) *
+                                static_cast<std::size_t>(patch.height)]);
+        local->adapt(patch, uniformBlocks(patch, 1), adapted.get());
     }
     writeTile(tile, patch, adapted, display);
 }
