@@ -81,7 +81,7 @@ void compareOurs(report::Table& table,
         const double before = light_s + building.passed().processor;
         const Stopwatch watch;
         picture = planePicture(stage, object, field);
-        add(fmt::format("ours, plane, {} samples", field.samples()),
+        add("ours, plane",
             before,
             watch.passed().processor,
             field.memoryBytes(),

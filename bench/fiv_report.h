@@ -150,8 +150,8 @@ inline void Table::write(const std::filesystem::path& folder) const
         const auto i = static_cast<std::size_t>(std::ranges::find(techniques, r.technique) -
                                                 techniques.begin());
         svg += fmt::format(
-            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"><title>{}: {}"
-            "</title></circle>\n",
+            "<g><title>{3}: {4}</title><circle cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"5\" "
+            "fill=\"{2}\"/></g>\n",
             x(r.precompute_s + r.shade_s),
             y(r.nrmse),
             color(i),

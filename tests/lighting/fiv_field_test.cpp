@@ -2,6 +2,7 @@
 
 #include "core/random.h"
 #include "tests/lighting/furniture_shapes.h"
+#include "tests/lighting/light_samples.h"
 #include "tests/support/errors.h"
 #include "tests/support/tolerance.h"
 
@@ -14,17 +15,6 @@ namespace {
 
 using std::numbers::pi;
 using testing::HasSubstr;
-
-Progress silent;
-
-EnvironmentMap skyWithWindow()
-{
-    EnvironmentMap map{Image<Rgb>(128, 64, Rgb(0.2f, 0.25f, 0.3f))};
-    for (int y = 12; y < 26; ++y)
-        for (int x = 20; x < 44; ++x)
-            map.pixels(x, y) = Rgb(5.0f, 4.0f, 2.0f);
-    return map;
-}
 
 class Field : public testing::Test {
 protected:
@@ -41,7 +31,7 @@ protected:
     }
 };
 
-double distance(const IrradianceVector& a, const IrradianceVector& b)
+double vectorDistance(const IrradianceVector& a, const IrradianceVector& b)
 {
     double most = 0.0;
     for (std::size_t c = 0; c < 3; ++c)
@@ -68,7 +58,7 @@ TEST_F(Field, ShellsHoldTheExactVectorsAtTheirNodes)
                 const glm::vec3 x = spherical(pi * i / 8.0, pi * j / 8.0, 0.4 * (1 << k));
                 const IrradianceVector truth = exact(x);
                 // The azimuth's polynomial is off by 2e-7 turns.
-                EXPECT_LT(distance(field.at(x), truth), 2e-4) << i << " " << j << " " << k;
+                EXPECT_LT(vectorDistance(field.at(x), truth), 2e-4) << i << " " << j << " " << k;
             }
 }
 
@@ -84,14 +74,14 @@ TEST_F(Field, ShellsAreTrilinearInBetween)
         a *= 0.5f;
         return a;
     };
-    EXPECT_LT(distance(at(15.5, 3, 2), middle(at(15, 3, 2), at(0, 3, 2))), 1e-4);
-    EXPECT_LT(distance(at(4, 3.5, 2), middle(at(4, 3, 2), at(4, 4, 2))), 1e-4);
-    EXPECT_LT(distance(at(4, 3, 2.5), middle(at(4, 3, 2), at(4, 3, 3))), 1e-4);
+    EXPECT_LT(vectorDistance(at(15.5, 3, 2), middle(at(15, 3, 2), at(0, 3, 2))), 1e-4);
+    EXPECT_LT(vectorDistance(at(4, 3.5, 2), middle(at(4, 3, 2), at(4, 4, 2))), 1e-4);
+    EXPECT_LT(vectorDistance(at(4, 3, 2.5), middle(at(4, 3, 2), at(4, 3, 3))), 1e-4);
     // Inside the first shell its own value, beyond the last a quarter at twice the distance.
-    EXPECT_LT(distance(at(4, 3, -1), at(4, 3, 0)), 1e-5);
+    EXPECT_LT(vectorDistance(at(4, 3, -1), at(4, 3, 0)), 1e-5);
     IrradianceVector quarter = at(4, 3, 4);
     quarter *= 0.25f;
-    EXPECT_LT(distance(at(4, 3, 5), quarter), 1e-5);
+    EXPECT_LT(vectorDistance(at(4, 3, 5), quarter), 1e-5);
 }
 
 TEST_F(Field, ShellsKnowTheThesisShadowCases)

@@ -351,6 +351,41 @@ TEST(HiddenLight, ASunCastsADarkShadowWithASharpEdge)
     EXPECT_NEAR(-1.0 + 0.01 * static_cast<double>(at - hidden.begin()), 0.0, 0.03);
 }
 
+// As in pmndrs_park.hdr: all of the sun is in four texels of a sky that is nearly 10⁶ times as
+// dark.
+TEST(HiddenLight, ASunInFourTexelsCastsOneShadow)
+{
+    EnvironmentMap map{Image<Rgb>(1024, 512, Rgb(0.5f))};
+    for (const glm::ivec2 at : {glm::ivec2(511, 127), {512, 127}, {511, 128}, {512, 128}})
+        map.pixels(at.x, at.y) = Rgb(4e5f);
+    const TriangleMesh board = shapes::box({-1.0f, 1.0f, -1.0f}, {1.0f, 1.02f, 1.0f});
+    const VisibilityAtlas atlas = buildVisibilityAtlas(board, kSmall, silent);
+    const ObjectLight object = lit(board, atlas, map);
+    const glm::vec3 up(0, 1, 0);
+    std::vector<glm::vec3> line;
+    for (int i = 0; i <= 400; ++i)
+        line.push_back(object.local().localFrom({0.0, 0.0, -1.0 + 0.01 * i}));
+    std::vector<Rgb> hidden(line.size());
+    hiddenIrradiance(object, line, up, hidden);
+    // Irradiance of the sun, from the texels' own directions.
+    double sun = 0.0;
+    for (const int row : {127, 128})
+        sun += 2.0 * 4e5 * environmentTexelSolidAngle(1024, 512, row) *
+               environmentDirectionFromUv({0.5, (row + 0.5) / 512}).y;
+    // The rest of the sky brings at most π/2.
+    for (int i = 0; i <= 400; ++i) {
+        const double z = -1.0 + 0.01 * i;
+        const double found = hidden[static_cast<std::size_t>(i)].g;
+        if (z < -0.07 || z > 2.09) {
+            EXPECT_LT(found, 0.5 * pi) << z;
+        }
+        if (z > 0.07 && z < 1.93) {
+            EXPECT_NEAR(found, sun, 0.5 * pi) << z;
+        }
+    }
+    EXPECT_GT(sun, 8.0 * pi);
+}
+
 TEST(HiddenLight, FloorUnderATableEqualsRaysOfTheSameDirections)
 {
     const TriangleMesh mesh = shapes::table();

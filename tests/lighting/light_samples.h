@@ -29,6 +29,16 @@ inline EnvironmentMap lamps()
     return map;
 }
 
+/// Dim sky with a wide window.
+inline EnvironmentMap skyWithWindow()
+{
+    EnvironmentMap map{Image<Rgb>(128, 64, Rgb(0.2f, 0.25f, 0.3f))};
+    for (int y = 12; y < 26; ++y)
+        for (int x = 20; x < 44; ++x)
+            map.pixels(x, y) = Rgb(5.0f, 4.0f, 2.0f);
+    return map;
+}
+
 inline ObjectLight lit(const TriangleMesh& mesh,
                        const VisibilityAtlas& atlas,
                        const EnvironmentMap& map,

@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 #include "reconstruct/ray_scene.h"
 #include "tests/lighting/furniture_shapes.h"
+#include "tests/lighting/light_samples.h"
 #include "tests/support/errors.h"
 #include "tests/support/tolerance.h"
 
@@ -12,17 +13,6 @@
 
 namespace insitu {
 namespace {
-
-Progress silent;
-
-EnvironmentMap skyWithWindow()
-{
-    EnvironmentMap map{Image<Rgb>(128, 64, Rgb(0.2f, 0.25f, 0.3f))};
-    for (int y = 12; y < 26; ++y)
-        for (int x = 20; x < 44; ++x)
-            map.pixels(x, y) = Rgb(5.0f, 4.0f, 2.0f);
-    return map;
-}
 
 class Stage : public testing::Test {
 protected:

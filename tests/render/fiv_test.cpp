@@ -3,6 +3,7 @@
 #include "lighting/place_light.h"
 #include "render/fiv/object_glow.h"
 #include "render/renderer.h"
+#include "tests/render/insertion_rooms.h"
 #include "tests/support/shapes.h"
 #include "tests/support/tolerance.h"
 
@@ -16,13 +17,6 @@ namespace insitu {
 namespace {
 
 using std::numbers::pi;
-
-Progress g_silent;
-
-EnvironmentMap uniform(float radiance)
-{
-    return {Image<Rgb>(128, 64, Rgb(radiance))};
-}
 
 /// A dim sky with one bright texel 45 degrees above the horizon, towards +x.
 EnvironmentMap sunny()
@@ -40,20 +34,9 @@ RoomDescription floorOnly()
     return room;
 }
 
-RoomDescription closedRoom()
-{
-    RoomDescription room;
-    room.boxes.push_back({{-2, 0, -3}, {2, 2.5, 2}, false, ""});
-    return room;
-}
-
 RoomLight lightOf(const SceneProxy& proxy, const EnvironmentMap& probe)
 {
-    RoomLightOptions options;
-    options.texel_m = 0.1;
-    options.cell_m = 0.5;
-    options.rays_per_cell = 64;
-    return RoomLight(proxy, probe, {0, 1, 0}, std::nullopt, options, g_silent);
+    return RoomLight(proxy, probe, {0, 1, 0}, std::nullopt, coarse(), g_silent);
 }
 
 struct Ball {
@@ -322,6 +305,20 @@ TEST(RenderFiv, AnEmptySceneChangesNothing)
     EXPECT_EQ(layers.alpha, Image<float>(16, 12));
     // A white furnace: π times the radiance.
     EXPECT_NEAR(layers.irradiance_without(8, 6).g, pi, 0.05 * pi);
+}
+
+TEST(RenderFiv, ABlackEnvironmentGivesBlackLayers)
+{
+    const SceneProxy proxy(floorOnly());
+    const RoomLight light = lightOf(proxy, uniform(0.0f));
+    const Camera camera = Camera::lookAt({1.2, 1.4, 1.6}, {0, 0.3, 0}, 24.0, 16, 12);
+    const RenderLayers layers =
+        renderInsertion(camera, light, balls({{{0, 0.4f, 0}, 0.4f}}, 0.5f), fiv(), g_silent).layers;
+    const Image<Rgb> black(16, 12);
+    EXPECT_EQ(layers.object, black);
+    EXPECT_EQ(layers.irradiance_with, black);
+    EXPECT_EQ(layers.irradiance_without, black);
+    EXPECT_EQ(layers.alpha(8, 6), 1.0f);
 }
 
 TEST(RenderFiv, SaysThatCutOutsCastWholeShadows)

@@ -1,5 +1,6 @@
 #include "core/parallel.h"
 #include "render/renderer.h"
+#include "tests/render/insertion_rooms.h"
 #include "tests/support/shapes.h"
 #include "tests/support/tolerance.h"
 
@@ -13,29 +14,6 @@ namespace insitu {
 namespace {
 
 using std::numbers::pi;
-
-Progress g_silent;
-
-EnvironmentMap uniform(float radiance)
-{
-    return {Image<Rgb>(128, 64, Rgb(radiance))};
-}
-
-RoomDescription closedRoom()
-{
-    RoomDescription room;
-    room.boxes.push_back({{-2, 0, -3}, {2, 2.5, 2}, false, ""});
-    return room;
-}
-
-RoomLightOptions coarse()
-{
-    RoomLightOptions options;
-    options.texel_m = 0.1;
-    options.cell_m = 0.5;
-    options.rays_per_cell = 64;
-    return options;
-}
 
 ObjectScene sphereScene(glm::vec3 center, float radius, float albedo)
 {
