@@ -217,8 +217,7 @@ TEST_F(ProbeWithReferences, ATungstenLampWithAlmostNoBlue)
     EXPECT_THAT(solved.messages, HasSubstr("light-clipped-solved"));
     EXPECT_NEAR(contrast(sky).r, 1.0, 0.05);
     EXPECT_NEAR(contrast(sky).g, 1.0, 0.05);
-    // Of little blue a larger error counts as little: one per cent of the lamp's luminance.
-    EXPECT_NEAR(contrast(sky).b, 1.0, 0.15);
+    EXPECT_NEAR(contrast(sky).b, 1.0, 0.05);
 }
 
 TEST_F(ProbeWithReferences, AClippedCardIsRefused)
