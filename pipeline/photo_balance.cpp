@@ -53,13 +53,33 @@ double colorSigma(std::map<std::size_t, Ratios>& faces, std::size_t c, double wh
     double total = 0.0;
     double squares = 0.0;
     for (auto& [face, ratios] : faces) {
-        if (ratios[c].size() < kMinPixels / 4 || ratios[3].size() < kMinPixels / 4) continue;
+        if (ratios[c].size() < kMinPixels / 4 || ratios[1].size() < kMinPixels / 4) continue;
         const double weight = static_cast<double>(ratios[c].size());
-        const double off = quantile(ratios[c], 0.5) - quantile(ratios[3], 0.5) - whole;
+        const double off = quantile(ratios[c], 0.5) - quantile(ratios[1], 0.5) - whole;
         total += weight;
         squares += weight * weight * off * off;
     }
     return total > 0.0 ? std::sqrt(squares) / total : 0.0;
+}
+
+struct ColorJudgement {
+    bool off = false;
+    bool doubtful = false;  ///< off, but the surfaces disagree by as much
+};
+
+ColorJudgement judgeColor(const PhotoBalance& balance)
+{
+    ColorJudgement judgement;
+    for (int c = 0; c < 3; ++c) {
+        if (std::max(balance.spread[c], balance.spread.g) >= kUselessSpread) continue;
+        const double log_color = std::abs(std::log(balance.measured[c] / balance.measured.g));
+        if (log_color <= kColorOff) continue;
+        if (log_color > kColorSigmas * balance.color_sigma[c])
+            judgement.off = true;
+        else
+            judgement.doubtful = true;
+    }
+    return judgement;
 }
 
 std::string gainsText(glm::dvec3 gains)
@@ -112,22 +132,19 @@ PhotoBalance measurePhotoBalance(const Image<Rgb>& radiance,
         if (2 * list.size() < balance.pixels) continue;  // mostly black
         balance.measured[c] = std::exp(quantile(list, 0.5));
         balance.spread[c] = 0.5 * (quantile(list, 0.75) - quantile(list, 0.25));
-        balance.color_sigma[c] = colorSigma(
-            faces, static_cast<std::size_t>(c), std::log(balance.measured[c] / balance.luminance));
     }
+    for (int c = 0; c < 3; ++c)
+        balance.color_sigma[c] = colorSigma(
+            faces, static_cast<std::size_t>(c), std::log(balance.measured[c] / balance.measured.g));
     return balance;
 }
 
 void choosePhotoBalance(const ProjectWhiteBalance& wanted, bool unit_known, PhotoBalance& balance)
 {
     using Mode = ProjectWhiteBalance::Mode;
-    balance.used = glm::dvec3(1.0);
-    const bool known = balance.pixels > 0;
-    if (wanted.mode == Mode::Given) {
-        balance.used = wanted.gains;
-        return;
-    }
-    if (!known) {
+    balance.used = wanted.mode == Mode::Given ? wanted.gains : glm::dvec3(1.0);
+    if (wanted.mode == Mode::Given) return;
+    if (balance.pixels == 0) {
         if (wanted.mode == Mode::Solved)
             balance.findings.push_back(
                 {Severity::Warning,
@@ -136,19 +153,42 @@ void choosePhotoBalance(const ProjectWhiteBalance& wanted, bool unit_known, Phot
                  "balance cannot be solved; give \"white_balance\" as three numbers"});
         return;
     }
-    // Exposure.
-    const double off = std::log(balance.luminance);
-    if (!unit_known || wanted.mode == Mode::Solved) {
+    const ColorJudgement color = judgeColor(balance);
+    if (wanted.mode == Mode::Solved || (wanted.mode == Mode::Auto && color.off)) {
+        for (int c = 0; c < 3; ++c)
+            balance.used[c] =
+                balance.spread[c] < kUselessSpread ? balance.measured[c] : balance.luminance;
+        balance.findings.push_back(
+            {Severity::Info,
+             "photo-white-balance-solved",
+             fmt::format(
+                 "the photograph has {} times the probe's light, by {} pixels that both see "
+                 "(spread {:.0f} %): its exposure and white balance are taken from that, and so "
+                 "are those of all light that is put into it",
+                 gainsText(balance.used),
+                 balance.pixels,
+                 100.0 * std::max({balance.spread.r, balance.spread.g, balance.spread.b}))});
+        return;
+    }
+    if (wanted.mode == Mode::Auto && color.doubtful)
+        balance.findings.push_back(
+            {Severity::Warning,
+             "photo-white-balance-doubtful",
+             fmt::format("surfaces seen by both have {} times the probe's light in the "
+                         "photograph, but disagree too much to tell a tint from wrong "
+                         "dimensions: its colour is not changed; \"white_balance\": \"solved\" "
+                         "takes it",
+                         gainsText(balance.measured))});
+    if (!unit_known) {
         balance.used = glm::dvec3(balance.luminance);
-        if (!unit_known)
-            balance.findings.push_back(
-                {Severity::Info,
-                 "light-scale-from-photograph",
-                 fmt::format("the light's exposure is unknown; scaled by {:.4g} so that surfaces "
-                             "seen by both agree (spread {:.0f} %)",
-                             balance.luminance,
-                             100.0 * balance.luminance_spread)});
-    } else if (std::abs(off) > kExposureOff) {
+        balance.findings.push_back(
+            {Severity::Info,
+             "light-scale-from-photograph",
+             fmt::format("the light's exposure is unknown; scaled by {:.4g} so that surfaces "
+                         "seen by both agree (spread {:.0f} %)",
+                         balance.luminance,
+                         100.0 * balance.luminance_spread)});
+    } else if (std::abs(std::log(balance.luminance)) > kExposureOff) {
         balance.findings.push_back(
             {Severity::Warning,
              "light-photo-mismatch",
@@ -157,43 +197,6 @@ void choosePhotoBalance(const ProjectWhiteBalance& wanted, bool unit_known, Phot
                          "reflectance and the room's dimensions",
                          1.0 / balance.luminance,
                          100.0 * balance.luminance_spread)});
-    }
-    if (wanted.mode == Mode::None) return;
-
-    // White balance: channels that tell.
-    glm::dvec3 color(1.0);
-    bool is_off = wanted.mode == Mode::Solved;
-    bool doubtful = false;
-    for (int c = 0; c < 3; ++c) {
-        if (balance.spread[c] >= kUselessSpread) continue;
-        color[c] = balance.measured[c] / balance.luminance;
-        const double log_color = std::abs(std::log(color[c]));
-        if (log_color <= kColorOff) continue;
-        if (log_color > kColorSigmas * balance.color_sigma[c])
-            is_off = true;
-        else
-            doubtful = true;
-    }
-    if (is_off) {
-        balance.used *= color;
-        balance.findings.push_back(
-            {Severity::Info,
-             "photo-white-balance-solved",
-             fmt::format(
-                 "the photograph's white balance is not the probe's: it has {} times its "
-                 "light, by {} pixels that both see (spread {:.0f} %), and so has all "
-                 "light that is put into it",
-                 gainsText(balance.used),
-                 balance.pixels,
-                 100.0 * std::max({balance.spread.r, balance.spread.g, balance.spread.b}))});
-    } else if (doubtful) {
-        balance.findings.push_back(
-            {Severity::Warning,
-             "photo-white-balance-doubtful",
-             fmt::format("surfaces seen by both have {} times the probe's light in the "
-                         "photograph, but disagree too much to tell a tint from wrong "
-                         "dimensions: nothing is changed; \"white_balance\": \"solved\" takes it",
-                         gainsText(balance.measured))});
     }
 }
 

@@ -22,7 +22,7 @@ struct PhotoBalance {
     /// Half the interquartile range of the logarithm over pixels, the same.
     glm::dvec3 spread{0.0};
     double luminance_spread = 0.0;
-    /// Standard deviation of the colour measured / luminance, as a logarithm: how much the
+    /// Standard deviation of the colour, measured over its green, as a logarithm: how much the
     /// surfaces, each by itself, disagree.
     glm::dvec3 color_sigma{0.0};
     std::size_t pixels = 0;  ///< that were compared; 0 when fewer than 100 could be
@@ -43,9 +43,10 @@ struct PhotoBalance {
                                                glm::dvec3 probe_center_m);
 
 /// Decides what is used. None: 1, or, when the probe's exposures are unknown (`unit_known` false),
-/// what was measured in luminance. Given: the numbers. Solved: all that was measured. Auto:
-/// exposure by EXIF, or as measured when that is unknown; white balance as measured when it is off
-/// by more than 5 % and by more than three of its standard deviations, else as the response has it.
+/// what was measured in luminance. Given: the numbers. Solved: all that was measured. Auto: all
+/// that was measured when the colour (over green, which cameras hardly amplify) is off by more than
+/// 5 % and by more than three of its standard deviations: then EXIF does not tell how much light
+/// each channel got. Else as None.
 ///
 /// Findings: "light-scale-from-photograph" (exposures unknown), "light-photo-mismatch" (luminance
 /// off by more than 25 % though exposures are known, and not solved), "photo-white-balance-solved"
