@@ -147,8 +147,7 @@ void run(const std::filesystem::path& room_file,
     judge.report("nothing inserted", capture.plate.image);
     judge.report("box unknown", insertObjects(without, options, silent).composite.image);
     judge.report("solid box of the room", insertObjects(with_box, options, silent).composite.image);
-    const auto withMark = [&](double off, int refine) {
-        Project project = with_box;
+    const auto withMark = [&](Project project, double off, int refine) {
         ForegroundMark mark;
         mark.polygon_px = marked(outline, off);
         mark.refine_px = refine;
@@ -156,11 +155,13 @@ void run(const std::filesystem::path& room_file,
         return project;
     };
     judge.report("outline, exact",
-                 insertObjects(withMark(0.0, 0), options, silent).composite.image);
+                 insertObjects(withMark(without, 0.0, 0), options, silent).composite.image);
     judge.report("outline, corners 2 px off",
-                 insertObjects(withMark(2.0, 0), options, silent).composite.image);
+                 insertObjects(withMark(without, 2.0, 0), options, silent).composite.image);
     judge.report("outline, 2 px off, refined",
-                 insertObjects(withMark(2.0, 6), options, silent).composite.image);
+                 insertObjects(withMark(without, 2.0, 6), options, silent).composite.image);
+    judge.report("outline and solid box",
+                 insertObjects(withMark(with_box, 0.0, 0), options, silent).composite.image);
 }
 
 }  // namespace

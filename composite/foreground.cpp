@@ -209,6 +209,16 @@ Image<Rgb> background(const Image<float>& coverage, const Image<Rgb>& radiance)
     return result;
 }
 
+/// The pixel is m F + (1 - m) B and F is not negative: no more than this of it can be uncovered,
+/// however soft the edge was marked.
+float mostUncovered(const Rgb& seen, const Rgb& behind)
+{
+    float most = 1.0f;
+    for (int c = 0; c < 3; ++c)
+        if (behind[c] > 0.0f) most = std::min(most, seen[c] / behind[c]);
+    return std::max(most, 0.0f);
+}
+
 }  // namespace
 
 Findings ForegroundMark::validate() const
@@ -241,8 +251,9 @@ Image<float> foregroundCoverage(const ForegroundMark& mark, const EncodedImage& 
                                      height));
     Image<float> coverage =
         mark.mask.empty() ? filledPolygon(mark.polygon_px, width, height) : mark.mask;
-    if (mark.refine_px > 0) coverage = refined(coverage, photo, mark.refine_px);
     if (mark.feather_px > 0.0) coverage = gaussianBlurred(coverage, mark.feather_px);
+    // Last: the picture's own edge has its blur already.
+    if (mark.refine_px > 0) coverage = refined(coverage, photo, mark.refine_px);
     return coverage;
 }
 
@@ -266,7 +277,7 @@ void putBehindForeground(const Image<float>& coverage,
             const float alpha = layers.alpha(x, y);
             const bool before = distance_m && alpha > 0.0f &&
                                 static_cast<double>(layers.depth_m(x, y)) < *distance_m;
-            const float uncovered = 1.0f - m;
+            const float uncovered = std::min(1.0f - m, mostUncovered(radiance(x, y), behind(x, y)));
             const Rgb without = layers.irradiance_without(x, y);
             const Rgb change = layers.irradiance_with(x, y) - without;
             if (before) {

@@ -29,7 +29,8 @@ struct ForegroundMark {
 
 /// Coverage of every pixel by the mark, [0, 1]: exactly 0 and 1 farther from its edge than the
 /// feather and the refinement reach. The refined edge follows from what the picture shows on both
-/// sides of it, in light (sRGB codes), smoothed by a guided filter of the codes. InputError: a
+/// sides of it, in light (sRGB codes), smoothed by a guided filter of the codes; its blur is the
+/// picture's, the feather only what the refinement begins with. InputError: a
 /// number out of range, not one of polygon and mask, fewer than three corners, a mask that is not
 /// of the photograph's size. Source: [HeSunTan13] section 3.
 [[nodiscard]] Image<float> foregroundCoverage(const ForegroundMark& mark,
@@ -38,9 +39,9 @@ struct ForegroundMark {
 /// Puts the objects of the layers behind the foreground. With m its coverage and B what the pixel
 /// would show without it, the pixel was m F + (1 - m) B and becomes
 ///   m F + (1 - m) (object + (1 - alpha) (B + change)),
-/// which needs B only: it is taken from the pixels around that the foreground leaves free. Where
-/// m = 1 the layers change nothing, so that the photograph stays byte for byte. `radiance` is the
-/// photograph's, in the layers' unit.
+/// which needs B only: it is taken from the pixels around that the foreground leaves free; m is
+/// taken as large as it must be for F not to be negative. Where m = 1 the layers change nothing, so
+/// that the photograph stays byte for byte. `radiance` is the photograph's, in the layers' unit.
 void putBehindForeground(const Image<float>& coverage,
                          std::optional<double> distance_m,
                          const Image<Rgb>& radiance,

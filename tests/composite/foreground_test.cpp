@@ -200,6 +200,48 @@ TEST(Foreground, ObjectsAndShadowsAreCompositedUnderIt)
     EXPECT_LT(worst, 0.015);
 }
 
+TEST(Foreground, ASofterMarkThanThePictureLeavesNoDarkSeam)
+{
+    // A sharp dark thing before a bright wall, marked with a soft edge: the wall that the mark
+    // takes out of dark pixels is not in them.
+    const Rgb dark(0.02f, 0.05f, 0.02f);
+    const Rgb wall(0.6f, 0.5f, 0.4f);
+    const Rgb color(0.3f, 0.1f, 0.1f);
+    Image<Rgb> seen(kWidth, kHeight);
+    EncodedImage photo;
+    photo.codes = Image<glm::u16vec3>(kWidth, kHeight);
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            seen(x, y) = x < 80 ? dark : wall;
+            for (int c = 0; c < 3; ++c)
+                photo.codes(x, y)[c] = static_cast<std::uint16_t>(
+                    255.0 * std::pow(static_cast<double>(seen(x, y)[c]), 1.0 / 2.2));
+        }
+    ForegroundMark mark;
+    mark.polygon_px = {{0, 0}, {80, 0}, {80, kHeight}, {0, kHeight}};
+    mark.feather_px = 1.2;
+    const auto composed = [&](int refine_px) {
+        mark.refine_px = refine_px;
+        RenderLayers layers = halfObject(color);
+        putBehindForeground(foregroundCoverage(mark, photo), std::nullopt, seen, layers);
+        Image<Rgb> result(kWidth, kHeight);
+        for (std::size_t i = 0; i < result.pixelCount(); ++i)
+            result.pixels()[i] =
+                layers.object.pixels()[i] + (1.0f - layers.alpha.pixels()[i]) * seen.pixels()[i];
+        return result;
+    };
+    const Image<Rgb> soft = composed(0);
+    const Image<Rgb> refined = composed(4);
+    for (int x = 60; x < kWidth; ++x)
+        for (int c = 0; c < 3; ++c) {
+            // Light is left of the dark where the mark says that half of it is wall.
+            EXPECT_GE(soft(x, 40)[c], 0.4f * dark[c]) << x;
+            // The picture's edge, but for an eighth of the wall that a guided filter of radius 2
+            // leaves.
+            EXPECT_NEAR(refined(x, 40)[c], (x < 80 ? dark : color)[c], 0.06) << x;
+        }
+}
+
 TEST(Foreground, WhatIsNearerStaysBefore)
 {
     const DiscScene scene;

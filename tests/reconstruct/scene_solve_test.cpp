@@ -273,12 +273,15 @@ TEST(SceneEstimate, TheCamerasErrorsAreInTheSigmas)
         SceneGraph graph = clean;
         RandomStream random(19, static_cast<std::uint64_t>(draw), 0);
         observe(graph, view, 1.0, random);
+        // Drawn by hand, not by errorSteps.
+        double normal[10];
+        for (double& one : normal)
+            one = gauss(random);
+        normal[3] = 0.7 * normal[0] + std::sqrt(1.0 - 0.7 * 0.7) * normal[3];
+        normal[7] = -0.6 * normal[1] + 0.8 * normal[7];
         CameraStep off{};
-        for (const CameraStep& step : errorSteps(calibrated)) {
-            const double share = gauss(random);
-            for (std::size_t i = 0; i < off.size(); ++i)
-                off[i] += share * step[i];
-        }
+        for (std::size_t i = 0; i < off.size(); ++i)
+            off[i] = sigma[i] * normal[i];
         CameraEstimate found = calibrated;
         found.camera = stepped(view, off);
         SceneSolver solver(graph, found.camera);
