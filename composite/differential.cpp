@@ -1,8 +1,8 @@
 #include "composite/differential.h"
 
 #include "composite/box_filter.h"
+#include "composite/match/grain_finish.h"
 #include "core/parallel.h"
-#include "core/random.h"
 
 #include <algorithm>
 #include <array>
@@ -18,47 +18,16 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 /// Side of the neighbourhood that tells noise from clipping, pixels: wider than JPEG's 8x8 blocks.
 constexpr int kClipWindow = 11;
-
-/// Variance of a photographed radiance that its grain makes, by channel.
-class RadianceNoise {
-public:
-    RadianceNoise(const CameraMatch& match, const ResponseCurve& response, double relative_exposure)
-        : match_(match), response_(response), relative_exposure_(relative_exposure)
-    {
-    }
-    /// Rise of the 8-bit code with the radiance there.
-    [[nodiscard]] double slope(int channel, double code) const
-    {
-        const double low = response_.decode(channel, std::max(0.0, code - 0.5));
-        const double high = response_.decode(channel, std::min(255.0, code + 0.5));
-        const double codes = std::min(255.0, code + 0.5) - std::max(0.0, code - 0.5);
-        return high > low ? codes * relative_exposure_ / (high - low) : 0.0;
-    }
-    [[nodiscard]] double codeSigma(int channel, double code) const
-    {
-        return match_.grain.sigmaAt(channel, code);
-    }
-    [[nodiscard]] double variance(int channel, double code) const
-    {
-        const double rise = slope(channel, code);
-        if (!(rise > 0.0)) return 0.0;
-        // Rounding to codes is noise too.
-        const double sigma = codeSigma(channel, code);
-        return (sigma * sigma + 1.0 / 12.0) / (rise * rise);
-    }
-
-private:
-    const CameraMatch& match_;
-    const ResponseCurve& response_;
-    double relative_exposure_;
-};
+/// Coverage from which a pixel is the object's: the tails of its blur below it count by what they
+/// change.
+constexpr float kCovered = 1.0f / 512.0f;
 
 /// ρ/π of every pixel's receiver; 0 where there is none.
 Image<Rgb> reflectanceOverPi(const EncodedImage& photo,
                              const Image<Rgb>& radiance,
                              const PhotoLayers& layers,
                              const CompositeOptions& options,
-                             const RadianceNoise& noise)
+                             const PhotoNoise& noise)
 {
     Image<Rgb> own(radiance.width(), radiance.height());
     const float limit = static_cast<float>(options.max_reflectance) / kPi;
@@ -85,30 +54,12 @@ Image<Rgb> reflectanceOverPi(const EncodedImage& photo,
             const double irradiance = layers.irradiance_without.pixels()[i][c];
             if (!(irradiance > 0.0)) continue;
             const double made =
-                noise.variance(c, photo.codes.pixels()[i][c] * 255.0 / photo.max_code) /
+                noise.radianceVariance(c, photo.codes.pixels()[i][c] * 255.0 / photo.max_code) /
                 (irradiance * irradiance);
             const double share = variance > 0.0 ? std::clamp(1.0 - made / variance, 0.0, 1.0) : 0.0;
             mixed.pixels()[i][c] = static_cast<float>(mean + share * (own.pixels()[i][c] - mean));
         }
     return mixed;
-}
-
-/// A rectangle of pixels, x0 <= x < x1.
-struct PixelBox {
-    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-};
-
-PixelBox boxOf(const Image<std::uint8_t>& mask)
-{
-    PixelBox box{mask.width(), mask.height(), 0, 0};
-    for (int y = 0; y < mask.height(); ++y)
-        for (int x = 0; x < mask.width(); ++x)
-            if (mask(x, y))
-                box = {std::min(box.x0, x),
-                       std::min(box.y0, y),
-                       std::max(box.x1, x + 1),
-                       std::max(box.y1, y + 1)};
-    return box;
 }
 
 /// Raises clipped channels to what the light probe knows of them; returns how many pixels had any.
@@ -156,64 +107,19 @@ std::size_t restoreClipped(const EncodedImage& photo,
     return count;
 }
 
-/// One channel of a changed pixel on its way to a code, 8-bit steps.
-struct CodeChange {
-    double before = 0.0;    ///< expected code of the photograph as it was
-    double after = 0.0;     ///< expected code with the objects
-    double lacking = 0.0;   ///< deviation of the grain that is still to be added
-    double existing = 0.0;  ///< deviation of what is there: the photograph's and the renderer's
-};
-
-/// Grain, dither and rounding of the changed pixels.
-class Finisher {
-public:
-    Finisher(const CameraMatch& match, const Image<std::uint8_t>& influence)
-        : match_(match), box_(boxOf(influence))
-    {
-        if (box_.x1 > box_.x0)
-            texture_ = grainTexture(
-                match.grain, box_.x0, box_.y0, box_.x1 - box_.x0, box_.y1 - box_.y0, match.seed);
-    }
-    /// The code of the photograph's depth.
-    [[nodiscard]] std::uint16_t finish(
-        int x, int y, int channel, int width, const CodeChange& change, int max_code) const
-    {
-        const double step = max_code / 255.0;
-        const double noisy =
-            change.after + change.lacking * texture_(x - box_.x0, y - box_.y0)[channel];
-        double rounding = 0.5;
-        // Grain of a whole code hides the steps by itself.
-        if (match_.dither && max_code == 255 && std::hypot(change.lacking, change.existing) < 0.5) {
-            RandomStream random(match_.seed ^ 0xD17E4u,
-                                static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
-                                    static_cast<std::uint64_t>(x),
-                                static_cast<std::uint64_t>(channel));
-            rounding = random.uniformDouble();
-        }
-        return static_cast<std::uint16_t>(
-            std::clamp(std::floor(noisy * step + rounding), 0.0, double(max_code)));
-    }
-
-private:
-    const CameraMatch& match_;
-    PixelBox box_;
-    Image<Rgb> texture_;
-};
-
 Composite compositeInOwnPrimaries(const EncodedImage& photo,
                                   const ResponseCurve& response,
                                   double relative_exposure,
-                                  const RenderLayers& rendered,
+                                  const PhotoLayers& layers,
                                   const CompositeOptions& options,
-                                  const CameraMatch& match,
-                                  const Image<float>& receiver_depth_m)
+                                  const CameraMatch& match)
 {
-    INSITU_CHECK(photo.codes.sameSize(rendered.object),
+    INSITU_CHECK(photo.codes.sameSize(layers.object),
                  "photograph {}x{}, layers {}x{}",
                  photo.codes.width(),
                  photo.codes.height(),
-                 rendered.object.width(),
-                 rendered.object.height());
+                 layers.object.width(),
+                 layers.object.height());
     const int width = photo.codes.width();
     const int height = photo.codes.height();
     const double clip_code = options.clip_fraction * photo.max_code;
@@ -222,15 +128,10 @@ Composite compositeInOwnPrimaries(const EncodedImage& photo,
     composite.image = photo;
     composite.linear = Image<Rgb>(width, height);
     composite.influence = Image<std::uint8_t>(width, height);
-    composite.layers = matchLayers(rendered, match, receiver_depth_m);
-    const PhotoLayers& layers = composite.layers;
     Image<Rgb> radiance = photographedRadiance(photo, response, relative_exposure);
     const std::size_t clipped = restoreClipped(photo, layers.probe_radiance, clip_code, radiance);
-    const RadianceNoise noise(match, response, relative_exposure);
+    const PhotoNoise noise(match.grain, response, relative_exposure);
     const Image<Rgb> reflectance = reflectanceOverPi(photo, radiance, layers, options, noise);
-    const auto codeOf = [&](int c, double value) {
-        return response.encode(c, value * relative_exposure);
-    };
 
     std::atomic<std::size_t> changed{0};
     std::atomic<std::size_t> changed_clipped{0};
@@ -244,48 +145,38 @@ Composite compositeInOwnPrimaries(const EncodedImage& photo,
             const Rgb after =
                 layers.object(x, y) + uncovered * glm::max(before + change, Rgb(0.0f));
             composite.linear(x, y) = after;
-            bool influenced = rendered.alpha(x, y) > 0.0f;
+            const Rgb covered = layers.coverage(x, y);
+            bool influenced = std::max({covered.r, covered.g, covered.b}) >= kCovered;
             for (int c = 0; c < 3; ++c)
-                influenced = influenced || std::abs(codeOf(c, after[c]) - codeOf(c, before[c])) *
-                                                   photo.max_code / 255.0 >=
-                                               options.influence_codes;
+                influenced =
+                    influenced || std::abs(noise.codeOf(c, after[c]) - noise.codeOf(c, before[c])) *
+                                          photo.max_code / 255.0 >=
+                                      options.influence_codes;
             if (!influenced) continue;
             composite.influence(x, y) = 1;
             changed.fetch_add(1);
         }
     });
 
-    const Finisher finisher(match, composite.influence);
+    const GrainFinisher finisher(match, noise, composite.influence);
     parallelFor(0, height, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
         for (int x = 0; x < width; ++x) {
             if (!composite.influence(x, y)) continue;
             bool was_clipped = false;
             for (int c = 0; c < 3; ++c) {
-                const std::uint16_t was = photo.codes(x, y)[c];
-                const double before = radiance(x, y)[c];
-                const double after = composite.linear(x, y)[c];
-                CodeChange code{codeOf(c, before), codeOf(c, after)};
-                const double rise = noise.slope(c, code.after);
-                const double old_rise = noise.slope(c, code.before);
-                // The photograph's noise goes with its share of the light.
-                const double kept = after - layers.object(x, y)[c];
-                const double photo_sigma =
-                    old_rise > 0.0 && before > 0.0
-                        ? noise.codeSigma(c, code.before) / old_rise * kept / before
-                        : 0.0;
-                code.existing =
-                    rise * std::hypot(photo_sigma, std::sqrt(layers.object_variance(x, y)));
-                const double wanted = noise.codeSigma(c, code.after);
-                code.lacking =
-                    std::sqrt(std::max(0.0, wanted * wanted - code.existing * code.existing));
-                std::uint16_t now = finisher.finish(x, y, c, width, code, photo.max_code);
+                const PixelChange change{radiance(x, y)[c],
+                                         composite.linear(x, y)[c],
+                                         layers.object(x, y)[c],
+                                         layers.object_variance(x, y)};
+                std::uint16_t code = finisher.finish(x, y, c, change, photo.max_code);
                 // A clipped channel stays as it came unless the light falls below the clipping.
+                const std::uint16_t was = photo.codes(x, y)[c];
                 if (was >= clip_code) {
                     was_clipped = true;
-                    now = std::min(now, was);
+                    code = std::min(code, was);
                 }
-                composite.image.codes(x, y)[c] = now;
+                composite.image.codes(x, y)[c] = code;
             }
             if (was_clipped) changed_clipped.fetch_add(1);
         }
@@ -361,29 +252,22 @@ Image<Rgb> photographedRadiance(const EncodedImage& photo,
 Composite compositeDifferential(const EncodedImage& photo,
                                 const ResponseCurve& response,
                                 double relative_exposure,
-                                const RenderLayers& layers,
+                                const PhotoLayers& layers,
                                 const CompositeOptions& options,
                                 const glm::dmat3& rec709_from_linear,
-                                const CameraMatch& match,
-                                const Image<float>& receiver_depth_m)
+                                const CameraMatch& match)
 {
     requireValid(options.validate(), "composite options");
     if (rec709_from_linear == glm::dmat3(1.0))
-        return compositeInOwnPrimaries(
-            photo, response, relative_exposure, layers, options, match, receiver_depth_m);
+        return compositeInOwnPrimaries(photo, response, relative_exposure, layers, options, match);
     const glm::dmat3 own_from_rec709 = glm::inverse(rec709_from_linear);
-    RenderLayers own = layers;
+    PhotoLayers own = layers;
     for (Image<Rgb>* image :
          {&own.object, &own.irradiance_without, &own.irradiance_with, &own.probe_radiance})
         (void)convertPixels(*image, own_from_rec709);
-    Composite composite = compositeInOwnPrimaries(
-        photo, response, relative_exposure, own, options, match, receiver_depth_m);
-    for (Image<Rgb>* image : {&composite.linear,
-                              &composite.layers.object,
-                              &composite.layers.irradiance_without,
-                              &composite.layers.irradiance_with,
-                              &composite.layers.probe_radiance})
-        (void)convertPixels(*image, rec709_from_linear);
+    Composite composite =
+        compositeInOwnPrimaries(photo, response, relative_exposure, own, options, match);
+    (void)convertPixels(composite.linear, rec709_from_linear);
     return composite;
 }
 

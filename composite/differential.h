@@ -1,9 +1,9 @@
 #pragma once
 
 #include "composite/match/camera_match.h"
+#include "composite/photo_layers.h"
 #include "core/color_profile.h"
 #include "core/finding.h"
-#include "core/layers.h"
 #include "core/photo.h"
 #include "core/response_curve.h"
 
@@ -43,8 +43,6 @@ struct Composite {
     EncodedImage image;             ///< same size and depth as the photograph
     Image<Rgb> linear;              ///< scene-linear radiance of the whole picture
     Image<std::uint8_t> influence;  ///< 1 where the photograph was changed
-    /// What was put onto the photograph, after the camera's blur and aberration; working primaries.
-    PhotoLayers layers;
     double influence_fraction = 0.0;
     Findings findings;  ///< "composite-clipped-pixels"
 };
@@ -66,19 +64,19 @@ struct Composite {
 /// stays clipped unless the result falls below the clipping level. Pixels outside the influence
 /// mask are the photograph's own codes.
 ///
-/// `match` is what the photograph's camera does to light (camera_match.h): the layers get its
-/// optics, and every changed pixel the grain that it lacks. A rendered pixel has none but its own
-/// Monte Carlo error; a shadowed one keeps the photograph's noise in proportion to its light.
+/// The layers have the optics of the photograph's camera already (matchLayers); `match` gives every
+/// changed pixel the grain that it lacks, and dithers what has none. A rendered pixel has none but
+/// its own Monte Carlo error; a shadowed one keeps the photograph's noise in proportion to its
+/// light.
 ///
 /// All of this happens in the photograph's own primaries, into which the layers are brought (what
 /// lies outside is cut), so that codes keep their meaning; `linear` is Rec. 709 again.
 [[nodiscard]] Composite compositeDifferential(const EncodedImage& photo,
                                               const ResponseCurve& response,
                                               double relative_exposure,
-                                              const RenderLayers& layers,
+                                              const PhotoLayers& layers,
                                               const CompositeOptions& options,
                                               const glm::dmat3& rec709_from_linear = glm::dmat3(1),
-                                              const CameraMatch& match = {},
-                                              const Image<float>& receiver_depth_m = {});
+                                              const CameraMatch& match = {});
 
 }  // namespace insitu

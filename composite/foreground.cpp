@@ -260,7 +260,7 @@ Image<float> foregroundCoverage(const ForegroundMark& mark, const EncodedImage& 
 void putBehindForeground(const Image<float>& coverage,
                          std::optional<double> distance_m,
                          const Image<Rgb>& radiance,
-                         RenderLayers& layers)
+                         PhotoLayers& layers)
 {
     INSITU_CHECK(coverage.sameSize(layers.object) && radiance.sameSize(layers.object),
                  "foreground {}x{}, layers {}x{}",
@@ -274,8 +274,8 @@ void putBehindForeground(const Image<float>& coverage,
         for (int x = 0; x < coverage.width(); ++x) {
             const float m = coverage(x, y);
             if (m <= 0.0f) continue;
-            const float alpha = layers.alpha(x, y);
-            const bool before = distance_m && alpha > 0.0f &&
+            const Rgb alpha = layers.coverage(x, y);
+            const bool before = distance_m && alpha != Rgb(0.0f) &&
                                 static_cast<double>(layers.depth_m(x, y)) < *distance_m;
             const float uncovered = std::min(1.0f - m, mostUncovered(radiance(x, y), behind(x, y)));
             const Rgb without = layers.irradiance_without(x, y);
@@ -287,18 +287,18 @@ void putBehindForeground(const Image<float>& coverage,
                 continue;
             }
             // The compositor computes object + (1 - alpha) (photograph + change): its terms here.
-            const float new_alpha = uncovered * alpha;
+            const Rgb new_alpha = uncovered * alpha;
             layers.object(x, y) =
                 uncovered * (layers.object(x, y) + alpha * (radiance(x, y) - behind(x, y)));
             // The compositor scales the change by the photograph, which is partly foreground here.
             const Rgb share =
                 glm::min(behind(x, y) / glm::max(radiance(x, y), Rgb(1e-12f)), Rgb(kMaxFactor));
             layers.irradiance_with(x, y) =
-                without +
-                share * change * (uncovered * (1.0f - alpha) / std::max(1.0f - new_alpha, 1e-6f));
-            layers.alpha(x, y) = new_alpha;
+                without + share * change *
+                              (uncovered * (1.0f - alpha) / glm::max(1.0f - new_alpha, Rgb(1e-6f)));
+            layers.coverage(x, y) = new_alpha;
             layers.object_variance(x, y) *= uncovered * uncovered;
-            if (!(new_alpha > 0.0f)) layers.depth_m(x, y) = 0.0f;
+            if (new_alpha == Rgb(0.0f)) layers.depth_m(x, y) = 0.0f;
         }
     });
 }

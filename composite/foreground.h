@@ -1,7 +1,7 @@
 #pragma once
 
+#include "composite/photo_layers.h"
 #include "core/finding.h"
-#include "core/layers.h"
 #include "core/photo.h"
 
 #include <glm/glm.hpp>
@@ -41,11 +41,12 @@ struct ForegroundMark {
 ///   m F + (1 - m) (object + (1 - alpha) (B + change)),
 /// which needs B only: it is taken from the pixels around that the foreground leaves free; m is
 /// taken as large as it must be for F not to be negative. Where m = 1 the layers change nothing, so
-/// that the photograph stays byte for byte. `radiance` is the photograph's, in the layers' unit.
+/// that the photograph stays byte for byte: the layers have their blur already. `radiance` is the
+/// photograph's, in the layers' unit.
 void putBehindForeground(const Image<float>& coverage,
                          std::optional<double> distance_m,
                          const Image<Rgb>& radiance,
-                         RenderLayers& layers);
+                         PhotoLayers& layers);
 
 /// Guided filter of `input` in [0, 1] with a colour guide: where the guide is of one colour the
 /// result is smooth, where it has an edge the result has it too. `epsilon`: variance of the guide

@@ -1,6 +1,7 @@
 #include "pipeline/capture_summary.h"
 
 #include "core/color.h"
+#include "core/quantile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,14 +27,6 @@ double frameWeight(const CapturedRadiance& captured, std::size_t frame, int chan
     const double t = captured.frames[frame].used_exposure;
     const double variance = captured.merged.noise.variance(response, channel, code);
     return variance > 0.0 ? t * t / variance : 0.0;
-}
-
-double quantile(std::vector<double>& values, double q)
-{
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-    std::ranges::nth_element(values, at);
-    return *at;
 }
 
 }  // namespace

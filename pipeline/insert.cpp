@@ -4,9 +4,9 @@
 #include "calib/photo_calibration.h"
 #include "core/color.h"
 #include "core/io/image_io.h"
+#include "pipeline/photo_light.h"
 #include "pipeline/photo_match.h"
 #include "pipeline/probe_location.h"
-#include "pipeline/radiance_mesh_stage.h"
 #include "pipeline/reference_capture.h"
 #include "pipeline/stage_cache.h"
 #include "pipeline/stage_parts.h"
@@ -42,98 +42,6 @@ private:
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
     std::clock_t worked_ = std::clock();
 };
-
-Exposure merged(Exposure exif, const Exposure& given)
-{
-    if (given.seconds) exif.seconds = given.seconds;
-    if (given.f_number) exif.f_number = given.f_number;
-    if (given.iso) exif.iso = given.iso;
-    return exif;
-}
-
-/// A curve with the free scale of recovered ones: exposure 1 at code 128.
-ResponseCurve scaledAtMiddle(ResponseCurve curve)
-{
-    for (auto& table : curve.exposure) {
-        const double middle = table[128];
-        for (double& value : table)
-            value /= middle;
-    }
-    return curve;
-}
-
-/// The photograph is a single exposure: its response is the probe's when one camera took both.
-void choosePhotoResponse(const Project& project, InsertResult& result)
-{
-    const PhotoMetadata& photo = result.photo.metadata;
-    const PhotoMetadata& probe = result.light.metadata;
-    const Exposure exposure = merged(photo.exposure, project.photo.exposure);
-    const bool same_camera = photo.make == probe.make && photo.model == probe.model;
-    const bool both_raw = photo.color.transfer_is_response && probe.color.transfer_is_response;
-    if (photo.color.transfer_is_response) {
-        // Developed from RAW: the curve is known. Light from RAW has the same unit.
-        result.photo_response =
-            both_raw ? photo.color.transfer : scaledAtMiddle(photo.color.transfer);
-    } else if (result.light.response_known && same_camera && sameColors(photo.color, probe.color)) {
-        result.photo_response = result.light.response;
-    } else {
-        result.photo_response = scaledAtMiddle(photo.color.transfer);
-        result.findings.push_back(
-            {Severity::Warning,
-             "photo-response-assumed-srgb",
-             !result.light.response_known
-                 ? fmt::format("no response was recovered for the photograph's camera: it is "
-                               "assumed to be {}",
-                               photo.color.transfer.source)
-                 : fmt::format("the photograph is from '{} {}' in '{}', the light probe from '{} "
-                               "{}' in '{}': the photograph's response is assumed to be {}",
-                               photo.make,
-                               photo.model,
-                               photo.color.name,
-                               probe.make,
-                               probe.model,
-                               probe.color.name,
-                               photo.color.transfer.source)});
-    }
-    const auto relative = exposure.relative();
-    if (!relative && result.light.radiance_unit_known)
-        throw InputError(project.photo.path.string(),
-                         "no exposure time in EXIF; add \"exposure_seconds\" beside \"image\" in "
-                         "the project file");
-    result.photo_relative_exposure = relative.value_or(1.0);
-}
-
-/// The photograph's light, and the same in the light probe's exposure and white balance for the
-/// stages that make the room's light from both: nothing where their units cannot be compared.
-struct PhotoLight {
-    Image<Rgb> taken;
-    std::optional<PhotographedRadiance> in_probe_unit;
-};
-
-PhotoLight photoLight(const Project& project,
-                      const SceneProxy& proxy,
-                      const glm::dmat3& primaries,
-                      InsertResult& result)
-{
-    PhotoLight light;
-    light.taken = photographedRadiance(
-        result.photo.image, result.photo_response, result.photo_relative_exposure, primaries);
-    glm::dvec3 clip;
-    for (std::size_t c = 0; c < 3; ++c)
-        clip[static_cast<int>(c)] =
-            result.photo_response.exposure[c][255] / result.photo_relative_exposure;
-    const Camera& camera = result.camera.camera;
-    result.balance = measurePhotoBalance(
-        light.taken, clip, camera, proxy, result.light.environment, result.light.center_m);
-    choosePhotoBalance(project.white_balance, result.light.radiance_unit_known, result.balance);
-    append(result.findings, std::move(result.balance.findings));
-    if (!result.light.radiance_unit_known) return light;
-    light.in_probe_unit = {camera, light.taken};
-    if (result.balance.used != glm::dvec3(1.0))
-        for (Rgb& value : light.in_probe_unit->radiance.pixels())
-            value /= Rgb(result.balance.used);
-    return light;
-}
 
 /// Objects into the world; what looks like a wrong scale or place is a finding.
 std::vector<ObjectScene::Object> placeObjects(const Project& project, InsertResult& result)
@@ -224,32 +132,6 @@ glm::dvec3 objectsCenter(const ObjectScene& objects)
     for (const BoundingBox& box : objects.bounds())
         sum += 0.5 * (box.min + box.max);
     return sum / std::max<double>(1.0, static_cast<double>(objects.bounds().size()));
-}
-
-/// What probe, numbers and photograph tell of the light; the last where both share a unit.
-std::vector<ReferenceGroup> allReferences(const Project& project,
-                                          const std::optional<PhotographedRadiance>& photographed,
-                                          InsertResult& result)
-{
-    std::vector<ReferenceGroup> groups = result.light.references;
-    if (!project.light.probe) return groups;
-    const std::string name = project.photo.path.string();
-    const auto in_photo = [](const ProjectReference& reference) {
-        return reference.source == ProjectReference::Source::Photo;
-    };
-    if (!photographed && std::ranges::any_of(project.light.probe->references, in_photo))
-        throw InputError(name,
-                         "cannot show a reference: its unit is not the probe's, whose exposures "
-                         "are unknown; give \"in\": \"probe\" or images of its own");
-    if (!photographed) return groups;
-    for (ReferenceGroup& group : photographedReferences(*project.light.probe,
-                                                        result.photo.image,
-                                                        photographed->radiance,
-                                                        photographed->camera,
-                                                        name,
-                                                        result.findings))
-        groups.push_back(std::move(group));
-    return groups;
 }
 
 /// Room light and render: what takes the time, and is kept whole.
@@ -362,70 +244,24 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     append(result.findings, result.render.findings);
     scaleLight(result.render.layers, result.balance.used);
 
+    matchPhoto(project, proxy, photo_radiance, options.match, result);
+    watch.lap("camera match");
     for (const ProjectForeground& foreground : project.foreground)
         putBehindForeground(foregroundOf(foreground, result.photo.image),
                             foreground.mark.distance_m,
                             photo_radiance,
-                            result.render.layers);
-    const Image<float> distance_m = proxyDistance(proxy, camera);
-    CameraMatchOptions match = options.match;
-    if (project.photo_focus_m) match.focus_m = project.photo_focus_m;
-    if (project.photo_vignetting) match.vignetting_a = project.photo_vignetting;
-    match.estimate_vignetting = match.estimate_vignetting || project.estimate_vignetting;
-    result.match =
-        estimateCameraMatch(result.photo.image,
-                            result.photo_response,
-                            photo_radiance,
-                            distance_m,
-                            {camera.principal_px, aperturePxM(result.photo.metadata, camera)},
-                            match);
-    append(result.findings, result.match.findings);
+                            result.layers);
     result.composite = compositeDifferential(result.photo.image,
                                              result.photo_response,
                                              result.photo_relative_exposure,
-                                             result.render.layers,
+                                             result.layers,
                                              options.composite,
                                              primaries,
-                                             result.match.match,
-                                             distance_m);
+                                             result.match.match);
     append(result.findings, result.composite.findings);
     append(result.findings, cache.findings());
     watch.lap("composite");
     return result;
-}
-
-ProjectRadianceMesh projectRadianceMesh(const Project& given,
-                                        const InsertOptions& options,
-                                        const RadianceMeshOptions& mesh_options,
-                                        Progress& progress)
-{
-    InsertResult result;
-    Project project = given;
-    result.photo = readPhoto(project.photo.path);
-    result.camera = solveCamera(project, result.photo, options.use_exif_focal);
-    append(result.findings, result.camera.findings);
-    append(result.findings, placeProbeFromOutline(result.camera, project));
-    const SceneProxy proxy(project.room);
-    append(result.findings, proxy.findings());
-    result.light = captureLight(project, proxy, result.camera.camera, options);
-    append(result.findings, result.light.findings);
-    choosePhotoResponse(project, result);
-    const std::optional<PhotographedRadiance> photographed =
-        photoLight(project, proxy, result.photo.metadata.color.rec709_from_linear, result)
-            .in_probe_unit;
-    RoomLightOptions light_options = options.light;
-    light_options.reference_point_m = project.objects.front().position_m;
-    light_options.references = allReferences(project, photographed, result);
-    const RoomLight room(proxy,
-                         result.light.environment,
-                         result.light.center_m,
-                         photographed,
-                         light_options,
-                         progress);
-    append(result.findings, room.findings());
-    return {makeRadianceMesh(
-                room, result.light.environment, result.light.center_m, photographed, mesh_options),
-            result.findings};
 }
 
 }  // namespace insitu

@@ -57,6 +57,7 @@ struct InsertResult {
     CapturedLight light;
     InsertionResult render;
     CameraMatchEstimate match;
+    PhotoLayers layers;  ///< what was put onto the photograph: matched, behind its foreground
     Composite composite;
     PhotoBalance balance;
     Findings findings;  ///< of all stages, in order

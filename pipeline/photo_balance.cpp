@@ -1,6 +1,7 @@
 #include "pipeline/photo_balance.h"
 
 #include "core/color.h"
+#include "core/quantile.h"
 
 #include <fmt/format.h>
 
@@ -26,14 +27,6 @@ constexpr double kColorSigmas = 3.0;
 /// A channel whose ratios scatter more than this tells nothing: it is black, or the room is wrong.
 constexpr double kUselessSpread = 0.4;
 const double kExposureOff = std::log(1.25);
-
-double quantile(std::vector<double>& values, double q)
-{
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-    std::ranges::nth_element(values, at);
-    return *at;
-}
 
 /// Logarithms of photograph / probe: red, green, blue, luminance.
 using Ratios = std::array<std::vector<double>, 4>;

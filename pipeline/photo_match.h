@@ -1,17 +1,17 @@
 #pragma once
 
-#include "composite/match/camera_match.h"
-#include "core/camera.h"
-#include "core/photo.h"
+#include "pipeline/insert.h"
 #include "reconstruct/scene_proxy.h"
 
 namespace insitu {
 
-/// Distance from the camera, metres, of the proxy's surface behind every pixel; 0 where there is
-/// none, and in openings, beyond which all is far away.
-[[nodiscard]] Image<float> proxyDistance(const SceneProxy& proxy, const Camera& camera);
-
-/// Focal length in pixels times the aperture's width in metres, by EXIF; 0 when it lacks one.
-[[nodiscard]] double aperturePxM(const PhotoMetadata& metadata, const Camera& camera);
+/// What the photograph shows of its camera, into `result.match`, and the rendered layers with it,
+/// into `result.layers`. Of `options`, what the project says of its photograph is taken instead.
+/// `radiance` is photographedRadiance.
+void matchPhoto(const Project& project,
+                const SceneProxy& proxy,
+                const Image<Rgb>& radiance,
+                const CameraMatchOptions& options,
+                InsertResult& result);
 
 }  // namespace insitu

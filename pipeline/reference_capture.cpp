@@ -2,6 +2,7 @@
 
 #include "core/check.h"
 #include "core/color.h"
+#include "core/quantile.h"
 
 #include <fmt/format.h>
 
@@ -27,14 +28,6 @@ constexpr double kUneven = 0.15;
 constexpr double kClipFraction = 0.98;
 /// Share of a card that may be clipped.
 constexpr double kClippedShare = 0.01;
-
-double quantile(std::vector<double>& values, double q)
-{
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-    std::ranges::nth_element(values, at);
-    return *at;
-}
 
 [[noreturn]] void refuse(const ReferencePicture& picture, const std::string& cause)
 {

@@ -130,32 +130,31 @@ void writeReport(const std::filesystem::path& path,
 
 void writeLayers(const std::filesystem::path& path, const InsertResult& result)
 {
-    const RenderLayers& layers = result.render.layers;
     std::vector<ExrChannel> channels;
     addColorLayer(channels, "beauty", result.composite.linear);
     // As they lie on the photograph, with its camera's blur and aberration.
-    const PhotoLayers& matched = result.composite.layers;
-    addColorLayer(channels, "object", matched.object);
-    addColorLayer(channels, "irradiance.with", matched.irradiance_with);
-    addColorLayer(channels, "irradiance.without", matched.irradiance_without);
-    Image<Rgb> ratio(layers.alpha.width(), layers.alpha.height(), Rgb(1.0f));
-    Image<Rgb> difference(layers.alpha.width(), layers.alpha.height());
-    Image<float> coverage(layers.alpha.width(), layers.alpha.height());
+    const PhotoLayers& layers = result.layers;
+    addColorLayer(channels, "object", layers.object);
+    addColorLayer(channels, "irradiance.with", layers.irradiance_with);
+    addColorLayer(channels, "irradiance.without", layers.irradiance_without);
+    Image<Rgb> ratio(layers.object.width(), layers.object.height(), Rgb(1.0f));
+    Image<Rgb> difference(layers.object.width(), layers.object.height());
+    Image<float> coverage(layers.object.width(), layers.object.height());
     for (std::size_t i = 0; i < ratio.pixelCount(); ++i) {
-        const Rgb with = matched.irradiance_with.pixels()[i];
-        const Rgb without = matched.irradiance_without.pixels()[i];
+        const Rgb with = layers.irradiance_with.pixels()[i];
+        const Rgb without = layers.irradiance_without.pixels()[i];
         for (int c = 0; c < 3; ++c)
             if (without[c] > 0.0f) ratio.pixels()[i][c] = with[c] / without[c];
         difference.pixels()[i] = with - without;
-        coverage.pixels()[i] = matched.coverage.pixels()[i].g;
+        coverage.pixels()[i] = layers.coverage.pixels()[i].g;
     }
     addColorLayer(channels, "shadow.ratio", ratio);
     addColorLayer(channels, "shadow.difference", difference);
     channels.push_back({"object.A", std::move(coverage)});
     channels.push_back({"depth.Z", layers.depth_m});
     channels.push_back({"variance.object.Y", layers.object_variance});
-    channels.push_back({"variance.ratio.Y", layers.ratio_variance});
-    Image<float> influence(layers.alpha.width(), layers.alpha.height());
+    channels.push_back({"variance.ratio.Y", result.render.layers.ratio_variance});
+    Image<float> influence(layers.object.width(), layers.object.height());
     for (std::size_t i = 0; i < influence.pixelCount(); ++i)
         influence.pixels()[i] = result.composite.influence.pixels()[i];
     channels.push_back({"influence.Y", std::move(influence)});

@@ -3,6 +3,8 @@
 #include "composite/match/layer_blur.h"
 #include "core/parallel.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -13,6 +15,8 @@ namespace {
 /// Blur and defocus below this do not show, pixels.
 constexpr double kVisibleBlur = 0.1;
 constexpr double kSignificant = 3.0;
+/// Code of a grey of 18 % in sRGB, 8 bit.
+constexpr double kMiddleGrey = 118.0;
 
 /// Pixels of a linear picture that tell of the camera: neither clipped nor black.
 Image<std::uint8_t> wellExposed(const EncodedImage& photo)
@@ -167,57 +171,59 @@ CameraMatchEstimate estimateCameraMatch(const EncodedImage& photo,
     match.centre_px = camera.principal_px;
     match.seed = options.seed;
     match.dither = options.dither;
-    std::string told;
+    std::vector<std::string> told;
     if (options.grain) {
         GrainEstimate grain = estimateGrain(photo, response);
-        append(estimate.findings, grain.findings);
+        append(estimate.findings, std::move(grain.findings));
         match.grain = std::move(grain.model);
-        told += fmt::format("grain {:.1f} codes at middle grey", match.grain.sigmaAt(1, 118.0));
+        const double sigma = match.grain.sigmaAt(1, kMiddleGrey);
+        if (sigma > 0.0) told.push_back(fmt::format("grain of {:.1f} codes at middle grey", sigma));
     }
+    const bool focus = options.depth_of_field && camera.aperture_px_m > 0.0;
+    const bool find_focus = focus && !options.focus_m && !depth_m.empty();
     const Image<std::uint8_t> usable = wellExposed(photo);
     std::vector<EdgeProfile> edges;
-    if (options.blur || options.chromatic_aberration || options.depth_of_field)
+    if (options.blur || options.chromatic_aberration || find_focus)
         edges = edgeProfiles(radiance, usable);
     if (options.blur) {
         estimate.blur = estimateBlur(edges);
         append(estimate.findings, estimate.blur.findings);
-        if (estimate.blur.sigma_px >= kVisibleBlur) match.blur_px = estimate.blur.sigma_px;
-        told += fmt::format("{}blur {:.2f} px", told.empty() ? "" : ", ", match.blur_px);
+        if (estimate.blur.sigma_px >= kVisibleBlur) {
+            match.blur_px = estimate.blur.sigma_px;
+            told.push_back(fmt::format("blur of {:.2f} px", match.blur_px));
+        }
     }
     if (options.chromatic_aberration) {
         estimate.aberration = estimateChromaticAberration(edges, camera.principal_px);
         if (estimate.aberration.significant) {
             match.magnification = estimate.aberration.magnification;
-            told += fmt::format(", red {:+.2f} px and blue {:+.2f} px in the corners",
-                                match.magnification.r * glm::length(camera.principal_px),
-                                match.magnification.b * glm::length(camera.principal_px));
+            const double corner_px = glm::length(camera.principal_px);
+            told.push_back(fmt::format("red {:+.2f} px and blue {:+.2f} px outwards in the corners",
+                                       match.magnification.r * corner_px,
+                                       match.magnification.b * corner_px));
         }
     }
-    if (options.vignetting) {
-        if (options.vignetting_a)
-            match.vignetting.a = *options.vignetting_a;
-        else if (options.estimate_vignetting) {
-            estimate.vignetting = estimateVignetting(radiance, usable, camera.principal_px);
-            if (estimate.vignetting.a > kSignificant * estimate.vignetting.sigma)
-                match.vignetting = estimate.vignetting;
-        }
-        if (match.vignetting.a != 0.0) {
-            told += fmt::format(", corners {:.0f} % darker",
-                                100.0 * (1.0 - match.vignetting.factor(1.0)));
-        }
+    if (options.vignetting && options.vignetting_a)
+        match.vignetting.a = *options.vignetting_a;
+    else if (options.vignetting && options.estimate_vignetting) {
+        estimate.vignetting = estimateVignetting(radiance, usable, camera.principal_px);
+        if (estimate.vignetting.a > kSignificant * estimate.vignetting.sigma)
+            match.vignetting = estimate.vignetting;
     }
-    if (options.depth_of_field && camera.aperture_px_m > 0.0) {
-        if (options.focus_m)
-            match.depth_of_field = DepthOfField{camera.aperture_px_m, *options.focus_m};
-        else if (!depth_m.empty())
-            match.depth_of_field = estimateFocus(edges, depth_m, camera.aperture_px_m);
-        if (match.depth_of_field)
-            told += fmt::format(", focus at {:.2f} m", match.depth_of_field->focus_m);
-    }
+    if (match.vignetting.a != 0.0)
+        told.push_back(fmt::format("corners darker by {:.0f} %",
+                                   100.0 * (1.0 - match.vignetting.factor(1.0))));
+    if (focus && options.focus_m)
+        match.depth_of_field = DepthOfField{camera.aperture_px_m, *options.focus_m};
+    else if (find_focus)
+        match.depth_of_field = estimateFocus(edges, depth_m, camera.aperture_px_m);
+    if (match.depth_of_field)
+        told.push_back(fmt::format("focus at {:.2f} m", match.depth_of_field->focus_m));
     if (!told.empty())
-        estimate.findings.push_back({Severity::Info,
-                                     "camera-matched",
-                                     "the objects get what the photograph shows: " + told});
+        estimate.findings.push_back(
+            {Severity::Info,
+             "camera-matched",
+             fmt::format("the objects get what the photograph shows: {}", fmt::join(told, ", "))});
     return estimate;
 }
 
@@ -230,7 +236,8 @@ PhotoLayers matchLayers(const RenderLayers& layers,
                        layers.irradiance_without,
                        layers.irradiance_with,
                        layers.probe_radiance,
-                       layers.object_variance};
+                       layers.object_variance,
+                       layers.depth_m};
     for (std::size_t i = 0; i < layers.alpha.pixelCount(); ++i)
         result.coverage.pixels()[i] = Rgb(layers.alpha.pixels()[i]);
     if (match.vignetting.a != 0.0) vignette(match, result);

@@ -2,9 +2,9 @@
 
 #include "composite/match/edge_profile.h"
 #include "composite/match/grain.h"
+#include "composite/photo_layers.h"
 #include "core/color_profile.h"
 #include "core/finding.h"
-#include "core/layers.h"
 #include "core/photo.h"
 #include "core/response_curve.h"
 
@@ -108,25 +108,15 @@ struct CameraMatchEstimate {
     Findings findings;
 };
 
-/// All of it from the photograph. `radiance` is photographedRadiance in the photograph's own
-/// primaries, `depth_m` of the surfaces behind it (0 unknown; may be empty). Aberration, vignetting
-/// and focus count only where they are over three deviations.
+/// All of it from the photograph. `radiance` is photographedRadiance, `depth_m` the distance of the
+/// surfaces behind it (0 unknown; may be empty). Aberration, vignetting and focus count only where
+/// they are over three deviations.
 [[nodiscard]] CameraMatchEstimate estimateCameraMatch(const EncodedImage& photo,
                                                       const ResponseCurve& response,
                                                       const Image<Rgb>& radiance,
                                                       const Image<float>& depth_m,
                                                       const MatchedCamera& camera,
                                                       const CameraMatchOptions& options);
-
-/// Layers as the photograph's camera would show them: coverage by channel.
-struct PhotoLayers {
-    Image<Rgb> object;  ///< premultiplied
-    Image<Rgb> coverage;
-    Image<Rgb> irradiance_without;
-    Image<Rgb> irradiance_with;
-    Image<Rgb> probe_radiance;
-    Image<float> object_variance;
-};
 
 /// Vignetting, depth of field, blur and aberration, in this order. Pixels without an object or a
 /// change of light within the blur's reach keep their layers exactly. Light under an object never

@@ -1,4 +1,5 @@
 #include "composite/match/edge_profile.h"
+#include "core/quantile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,13 +11,6 @@ namespace {
 constexpr int kMinEdges = 20;
 /// Variance of a pixel's box across an edge of any direction, pixels squared.
 constexpr double kBoxVariance = 1.0 / 12.0;
-
-double median(std::vector<double> values)
-{
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 /// Huber's weights for residuals of one deviation.
 double huber(double residual)
@@ -51,12 +45,12 @@ BlurEstimate estimateBlur(const std::vector<EdgeProfile>& edges)
     std::size_t best = 0;
     for (std::size_t i = 0; i + half <= sharper; ++i)
         if (spreads[i + half - 1] / spreads[i] < spreads[best + half - 1] / spreads[best]) best = i;
-    const std::vector<double> crowd(spreads.begin() + static_cast<std::ptrdiff_t>(best),
-                                    spreads.begin() + static_cast<std::ptrdiff_t>(best + half));
-    const double spread = median(crowd);
-    estimate.sigma_px = std::sqrt(std::max(0.0, spread * spread - kBoxVariance));
+    std::vector<double> crowd(spreads.begin() + static_cast<std::ptrdiff_t>(best),
+                              spreads.begin() + static_cast<std::ptrdiff_t>(best + half));
     // Half of a crowd spans 0.67 of its deviation to both sides.
     const double deviation = (crowd.back() - crowd.front()) / (2.0 * 0.6745);
+    const double spread = quantile(crowd, 0.5);
+    estimate.sigma_px = std::sqrt(std::max(0.0, spread * spread - kBoxVariance));
     estimate.sigma_of_sigma_px = 1.2533 * deviation / std::sqrt(static_cast<double>(half)) *
                                  spread / std::max(estimate.sigma_px, 0.1);
     return estimate;
@@ -76,7 +70,7 @@ ChromaticAberration estimateChromaticAberration(const std::vector<EdgeProfile>& 
             for (const EdgeProfile& edge : edges)
                 size.push_back(std::abs(edge.offset[c] - edge.offset.g -
                                         k * glm::dot(edge.normal, edge.at - centre_px)));
-            scale = std::max(1.4826 * median(size), 1e-6);
+            scale = std::max(1.4826 * quantile(size, 0.5), 1e-6);
             double cross = 0.0;
             information = 0.0;
             for (const EdgeProfile& edge : edges) {

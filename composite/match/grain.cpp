@@ -2,6 +2,7 @@
 
 #include "composite/match/grain_blocks.h"
 #include "core/parallel.h"
+#include "core/quantile.h"
 #include "core/random.h"
 
 #include <algorithm>
@@ -16,8 +17,6 @@ constexpr double kLevelStep = 256.0 / GrainModel::kLevels;
 constexpr std::size_t kMinFlatBlocks = 40;
 /// Variance against the law's beyond which a block counts as textured whatever the crowd says.
 constexpr double kMaxExcess = 3.0;
-/// Variance of rounding to whole 8-bit codes.
-constexpr double kRoundingVariance = 1.0 / 12.0;
 /// Blocks that weigh as much as the sensor's law in the correction of one level.
 constexpr double kLawWeight = 20.0;
 
@@ -111,14 +110,6 @@ struct SensorLaw {
     }
 };
 
-double quantile(std::vector<double> values, double q)
-{
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-}
-
 /// The densest half of the densest half of ... sorted values: where they crowd. [BicFru06]
 double halfSampleMode(std::vector<double> values)
 {
@@ -136,8 +127,8 @@ double halfSampleMode(std::vector<double> values)
     return 0.5 * (values[first] + values[first + count - 1]);
 }
 
-/// Photon noise of the ranges of levels that are quietest against it: where a range holds nothing
-/// but texture its blocks are louder, and must not start the search.
+/// Photon noise of the range of levels that is quietest against it: where a range holds nothing but
+/// texture its blocks are louder, and must not start the search.
 double quietestPhotonNoise(const std::vector<GrainBlock>& blocks, const SensorLaw& law, int channel)
 {
     constexpr std::size_t kRanges = 16;
@@ -154,7 +145,7 @@ double quietestPhotonNoise(const std::vector<GrainBlock>& blocks, const SensorLa
     std::vector<double> floors;
     for (auto& range : ratios)
         if (range.size() >= kEnough) floors.push_back(quantile(range, 0.1));
-    return floors.empty() ? 0.0 : quantile(floors, 0.0);
+    return floors.empty() ? 0.0 : *std::min_element(floors.begin(), floors.end());
 }
 
 /// Marks the blocks whose variance is the noise's, and fits the three laws to them.

@@ -11,6 +11,9 @@
 
 namespace insitu {
 
+/// Variance of rounding to whole 8-bit codes.
+inline constexpr double kRoundingVariance = 1.0 / 12.0;
+
 /// Noise of one photograph as its pixels show it: after demosaicing, the camera's own smoothing and
 /// JPEG.
 ///
@@ -43,8 +46,8 @@ struct GrainEstimate {
 /// flattest blocks of the same level, else texture. The level's dependence follows the sensor,
 ///     var(z) = (a + b E(z)) (dz/dE)² + q,   E the response's exposure,
 /// with a measured correction by level (JPEG and noise reduction bend it). Correlation up to 4
-/// pixels is the normalised residuals' own. Within 10 % of the truth on photographs of which a
-/// tenth is flat. Depends on nothing but its arguments.
+/// pixels is the normalised residuals' own. Within 12 % of the truth (6 % rms) at every level
+/// of simulated photographs of which half is flat. Depends on nothing but its arguments.
 /// Sources: [LiuFreSze06] section 2 for levels, [Foi08] equation 1 for the sensor.
 [[nodiscard]] GrainEstimate estimateGrain(const EncodedImage& photo, const ResponseCurve& response);
 

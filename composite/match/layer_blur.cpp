@@ -1,6 +1,5 @@
 #include "composite/match/layer_blur.h"
 
-#include "composite/match/camera_match.h"
 #include "core/parallel.h"
 
 #include <algorithm>
@@ -109,6 +108,7 @@ void blurLayers(const LayerBlur& blur, PhotoLayers& layers)
             Rgb without(0.0f);
             Rgb with(0.0f);
             float variance = 0.0f;
+            float depth = 0.0f;
             float seen = 0.0f;
             for (int dy = -reach; dy <= reach; ++dy)
                 for (int dx = -reach; dx <= reach; ++dx) {
@@ -125,6 +125,7 @@ void blurLayers(const LayerBlur& blur, PhotoLayers& layers)
                         object += w * sharp.object(sx, sy);
                         coverage += w * covered;
                         variance += w * w * sharp.object_variance(sx, sy);
+                        depth += w * alpha * sharp.depth_m(sx, sy);
                     }
                     const float w = own.weight[ax] * own.weight[ay] * (1.0f - alpha);
                     if (w > 0.0f && sharp.irradiance_without(sx, sy) != Rgb(0.0f)) {
@@ -136,6 +137,7 @@ void blurLayers(const LayerBlur& blur, PhotoLayers& layers)
             layers.object(x, y) = object;
             layers.coverage(x, y) = glm::min(coverage, Rgb(1.0f));
             layers.object_variance(x, y) = variance;
+            layers.depth_m(x, y) = coverage.g > 0.0f ? depth / coverage.g : 0.0f;
             if (seen > 0.0f) {
                 layers.irradiance_without(x, y) = without / seen;
                 layers.irradiance_with(x, y) = with / seen;

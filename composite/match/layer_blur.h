@@ -1,5 +1,6 @@
 #pragma once
 
+#include "composite/photo_layers.h"
 #include "core/image.h"
 
 #include <array>
@@ -24,7 +25,6 @@ struct LayerBlur {
     float max_sigma_px = 0.0f;
 };
 
-struct PhotoLayers;
 void blurLayers(const LayerBlur& blur, PhotoLayers& layers);
 
 }  // namespace insitu

@@ -1,5 +1,6 @@
 #include "composite/match/camera_match.h"
 #include "core/color.h"
+#include "core/quantile.h"
 
 #include <algorithm>
 #include <array>
@@ -171,8 +172,7 @@ std::optional<DepthOfField> estimateFocus(const std::vector<EdgeProfile>& edges,
         if (!(determinant > 1e-12 * sw * sqq)) return std::nullopt;
         slope = (sw * sqy - sq * sy) / determinant;
         level = (sy - slope * sq) / sw;
-        std::nth_element(size.begin(), size.begin() + std::ptrdiff_t(size.size() / 2), size.end());
-        scale = std::max(1.4826 * size[size.size() / 2], 1.0);
+        scale = std::max(1.4826 * quantile(size, 0.5), 1.0);
         slope_sigma = scale * std::sqrt(sw / determinant);
     }
     const double q0 = -slope / (2.0 * b);

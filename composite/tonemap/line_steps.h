@@ -63,7 +63,8 @@ INSITU_KERNEL void filterLine(const float* in,
     }
 }
 
-/// The same along a row whose columns are sorted by parity, for its even columns.
+/// The same along a row whose columns are sorted by parity, for its even columns; for its odd ones
+/// they change places: filterEven(odd, even + 1, ...).
 template <int kRadius>
 INSITU_KERNEL void filterEven(const float* even,
                               const float* odd,
@@ -78,26 +79,6 @@ INSITU_KERNEL void filterEven(const float* even,
             const int m = k / 2;
             sum +=
                 kernel[k] * (k % 2 == 0 ? even[i - m] + even[i + m] : odd[i - m - 1] + odd[i + m]);
-        }
-        out[i] = sum;
-    }
-}
-
-/// And for its odd columns.
-template <int kRadius>
-INSITU_KERNEL void filterOdd(const float* even,
-                             const float* odd,
-                             const float* kernel,
-                             float* __restrict out,
-                             std::ptrdiff_t count)
-{
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
-        float sum = kernel[0] * odd[i];
-#pragma GCC unroll 16
-        for (int k = 1; k <= kRadius; ++k) {
-            const int m = k / 2;
-            sum +=
-                kernel[k] * (k % 2 == 0 ? odd[i - m] + odd[i + m] : even[i - m] + even[i + m + 1]);
         }
         out[i] = sum;
     }

@@ -208,7 +208,8 @@ INSITU_KERNEL void fineScale(Search& search, int y, int first, int count)
     filterLine<kRadius>(search.patch.odd(y) + start, stride, kernel, odd, width);
     const int skip = kRadius / 2 + 1;
     filterEven<kRadius>(even + skip, odd + skip, kernel, search.lines[0][kScale + 1].values, count);
-    filterOdd<kRadius>(even + skip, odd + skip, kernel, search.lines[1][kScale + 1].values, count);
+    filterEven<kRadius>(
+        odd + skip, even + skip + 1, kernel, search.lines[1][kScale + 1].values, count);
 }
 
 /// Row y of a half-level plane at the picture's pixels: what it has is the even column.

@@ -221,8 +221,13 @@ TEST(CameraMatch, CompositeHasThePhotographsGrainAndOptics)
     EXPECT_TRUE(hasFinding(estimate.findings, "camera-matched"));
     EXPECT_TRUE(hasFinding(estimate.findings, "blur-unknown"));
     RenderLayers layers = boxLayers();
-    const Composite composite =
-        compositeDifferential(photo, response, 1.0, layers, {}, glm::dmat3(1.0), estimate.match);
+    const Composite composite = compositeDifferential(photo,
+                                                      response,
+                                                      1.0,
+                                                      matchLayers(layers, estimate.match),
+                                                      {},
+                                                      glm::dmat3(1.0),
+                                                      estimate.match);
     const auto deviation = [&](int x0, int x1) {
         double mean = 0.0, square = 0.0, count = 0.0;
         for (int y = 110; y < 190; ++y)
@@ -247,15 +252,21 @@ TEST(CameraMatch, CompositeHasThePhotographsGrainAndOptics)
     EXPECT_NEAR(deviation(155, 225), truth(0.05f), 0.1 * truth(0.05f));
     EXPECT_NEAR(deviation(235, 295), truth(0.06f), 0.1 * truth(0.06f));
     // Without it, the object is flat and the shadow too quiet.
-    const Composite plain = compositeDifferential(photo, response, 1.0, layers, {});
+    const Composite plain =
+        compositeDifferential(photo, response, 1.0, matchLayers(layers, {}), {});
     for (int y = 110; y < 190; ++y)
         EXPECT_EQ(plain.image.codes(200, y), plain.image.codes(200, 110));
     // Pixels out of reach are the photograph's, and threads do not matter.
     for (int x = 0; x < 140; ++x)
         ASSERT_EQ(composite.image.codes(x, 150), photo.codes(x, 150));
     setThreadCount(1);
-    const Composite alone =
-        compositeDifferential(photo, response, 1.0, layers, {}, glm::dmat3(1.0), estimate.match);
+    const Composite alone = compositeDifferential(photo,
+                                                  response,
+                                                  1.0,
+                                                  matchLayers(layers, estimate.match),
+                                                  {},
+                                                  glm::dmat3(1.0),
+                                                  estimate.match);
     setThreadCount(0);
     EXPECT_EQ(alone.image.codes, composite.image.codes);
 }
@@ -269,8 +280,8 @@ TEST(CameraMatch, DitherOnlyWhereChangedAndWithoutBias)
     CameraMatch match;
     match.dither = true;
     const ResponseCurve response = ResponseCurve::srgb();
-    const Composite composite =
-        compositeDifferential(photo, response, 1.0, layers, {}, glm::dmat3(1.0), match);
+    const Composite composite = compositeDifferential(
+        photo, response, 1.0, matchLayers(layers, match), {}, glm::dmat3(1.0), match);
     double mean = 0.0;
     for (int y = 110; y < 190; ++y)
         for (int x = 155; x < 225; ++x)
@@ -302,8 +313,13 @@ TEST(CameraMatch, MixedFormKeepsTextureAndSmoothsNoise)
     const auto error = [&](CompositeForm form, int x0, int x1) {
         CompositeOptions options;
         options.form = form;
-        const Composite composite = compositeDifferential(
-            photo, ResponseCurve::srgb(), 1.0, layers, options, glm::dmat3(1.0), match);
+        const Composite composite = compositeDifferential(photo,
+                                                          ResponseCurve::srgb(),
+                                                          1.0,
+                                                          matchLayers(layers, match),
+                                                          options,
+                                                          glm::dmat3(1.0),
+                                                          match);
         // Of the change that was made against the true one, half of the light.
         const Image<Rgb> before = photographedRadiance(photo, ResponseCurve::srgb(), 1.0);
         double sum = 0.0, count = 0.0;
@@ -323,6 +339,33 @@ TEST(CameraMatch, MixedFormKeepsTextureAndSmoothsNoise)
     EXPECT_LT(flat_difference, 0.5 * flat_ratio);
     EXPECT_LT(error(CompositeForm::Mixed, 20, 240), 1.1 * weave_ratio);
     EXPECT_LT(error(CompositeForm::Mixed, 280, 460), 0.5 * flat_ratio);
+}
+
+TEST(CameraMatch, EveryPartCanBeLeftOut)
+{
+    CameraMatchOptions options;
+    for (const std::string& part : kMatchParts)
+        if (part != "all") leaveOut(part, options);
+    const CameraMatchOptions none = options;
+    EXPECT_FALSE(none.grain || none.blur || none.vignetting || none.chromatic_aberration ||
+                 none.depth_of_field || none.dither);
+    CameraMatchOptions at_once;
+    leaveOut("all", at_once);
+    EXPECT_FALSE(at_once.grain || at_once.blur || at_once.vignetting ||
+                 at_once.chromatic_aberration || at_once.depth_of_field || at_once.dither);
+    CameraMatchOptions one;
+    leaveOut("blur", one);
+    EXPECT_TRUE(!one.blur && one.grain && one.dither && one.chromatic_aberration);
+    const EncodedImage photo = SimulatedPhoto{}.take(Image<Rgb>(kWidth, kHeight, Rgb(0.3f)), 2);
+    const CameraMatchEstimate estimate =
+        estimateCameraMatch(photo,
+                            ResponseCurve::srgb(),
+                            photographedRadiance(photo, ResponseCurve::srgb(), 1.0),
+                            {},
+                            {kCentre, 0.0},
+                            none);
+    EXPECT_TRUE(estimate.findings.empty());
+    EXPECT_EQ(estimate.match.grain.sigmaAt(1, 128.0), 0.0);
 }
 
 TEST(CameraMatch, OptionsOutOfRangeAreRefused)

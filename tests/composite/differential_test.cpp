@@ -39,8 +39,8 @@ TEST(CompositeDifferential, NothingAddedLeavesEveryCode)
 {
     for (const int max_code : {255, 65535}) {
         const EncodedImage photo = rampPhoto(max_code);
-        const Composite composite =
-            compositeDifferential(photo, ResponseCurve::srgb(), kExposure, quietLayers(32, 24), {});
+        const Composite composite = compositeDifferential(
+            photo, ResponseCurve::srgb(), kExposure, matchLayers(quietLayers(32, 24), {}), {});
         EXPECT_EQ(composite.image.codes, photo.codes);
         EXPECT_EQ(composite.influence_fraction, 0.0);
         EXPECT_TRUE(composite.findings.empty());
@@ -55,7 +55,8 @@ TEST(CompositeDifferential, HalfTheLightIsHalfTheRadiance)
     // Dim enough that no receiver counts as shining.
     layers.irradiance_without = Image<Rgb>(32, 24, Rgb(400.0f));
     layers.irradiance_with = Image<Rgb>(32, 24, Rgb(200.0f));
-    const Composite composite = compositeDifferential(photo, response, kExposure, layers, {});
+    const Composite composite =
+        compositeDifferential(photo, response, kExposure, matchLayers(layers, {}), {});
     const Image<Rgb> before = photographedRadiance(photo, response, kExposure);
     for (std::size_t i = 0; i < before.pixelCount(); ++i)
         for (int c = 0; c < 3; ++c) {
@@ -74,7 +75,8 @@ TEST(CompositeDifferential, ChangesBelowHalfACodeAreNotMade)
     RenderLayers layers = quietLayers(32, 24);
     layers.irradiance_with = Image<Rgb>(32, 24, Rgb(20.0f * 0.9995f));
     EXPECT_EQ(
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}).image.codes,
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {})
+            .image.codes,
         photo.codes);
 }
 
@@ -86,7 +88,7 @@ TEST(CompositeDifferential, OnlyPixelsUnderTheInfluenceChange)
         for (int x = 8; x < 20; ++x)
             layers.irradiance_with(x, y) *= 0.4f;
     const Composite composite =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {});
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {});
     for (int y = 0; y < 24; ++y)
         for (int x = 0; x < 32; ++x) {
             const bool inside = y >= 10 && y < 15 && x >= 8 && x < 20;
@@ -107,7 +109,8 @@ TEST(CompositeDifferential, OpaqueObjectReplacesThePhotograph)
     layers.alpha(4, 4) = 1.0f;
     layers.object(5, 4) = 0.5f * radiance;
     layers.alpha(5, 4) = 0.5f;
-    const Composite composite = compositeDifferential(photo, response, kExposure, layers, {});
+    const Composite composite =
+        compositeDifferential(photo, response, kExposure, matchLayers(layers, {}), {});
     const Image<Rgb> before = photographedRadiance(photo, response, kExposure);
     for (int c = 0; c < 3; ++c) {
         EXPECT_NEAR(
@@ -127,10 +130,10 @@ TEST(CompositeDifferential, FormsAgreeWhenReflectanceIsPerPixel)
     CompositeOptions difference;
     difference.form = CompositeForm::Difference;
     difference.reflectance_window = 1;
-    const Composite a =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, ratio);
-    const Composite b =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, difference);
+    const Composite a = compositeDifferential(
+        photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), ratio);
+    const Composite b = compositeDifferential(
+        photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), difference);
     EXPECT_EQ(a.image.codes, b.image.codes);
 }
 
@@ -147,8 +150,8 @@ TEST(CompositeDifferential, SmoothedReflectanceIgnoresNoiseInTheDark)
     CompositeOptions options;
     options.form = CompositeForm::Difference;
     const Image<Rgb> before = photographedRadiance(photo, ResponseCurve::srgb(), kExposure);
-    const Composite composite =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, options);
+    const Composite composite = compositeDifferential(
+        photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), options);
     float least = 1e9f;
     float most = 0.0f;
     for (int y = 16; y < 48; ++y)
@@ -177,7 +180,7 @@ TEST(CompositeDifferential, ClippedChannelIsABound)
     layers.irradiance_without(2, 0) = Rgb(100.0f * bound);
     layers.irradiance_with(2, 0) = Rgb(50.0f * bound);
     const Composite composite =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {});
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {});
     EXPECT_EQ(composite.image.codes(0, 0).g, 255);
     EXPECT_NEAR(composite.image.codes(1, 0).g, ResponseCurve::srgb().encode(1, 0.3), 0.51);
     EXPECT_NEAR(composite.image.codes(2, 0).g, ResponseCurve::srgb().encode(1, 0.5), 0.51);
@@ -192,10 +195,12 @@ TEST(CompositeDifferential, ALampIsNotShadowedLikeAWall)
     const float radiance = photographedRadiance(photo, ResponseCurve::srgb(), kExposure)(0, 0).g;
     layers.irradiance_without(0, 0) = Rgb(radiance * 3.14159f / 20.0f);
     const Composite composite =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {});
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {});
     layers.irradiance_with(0, 0) = Rgb(0.0f);
     EXPECT_GT(
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}).linear(0, 0).g,
+        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {})
+            .linear(0, 0)
+            .g,
         0.9f * radiance);
 }
 
@@ -208,8 +213,8 @@ TEST(CompositeDifferential, WidePrimariesKeepEveryCodeThatIsNotTouched)
     const EncodedImage photo = rampPhoto();
     RenderLayers layers = quietLayers(32, 24);
     layers.irradiance_with(5, 5) *= 0.4f;
-    const Composite composite =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}, kRec709FromP3);
+    const Composite composite = compositeDifferential(
+        photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {}, kRec709FromP3);
     for (int y = 0; y < 24; ++y)
         for (int x = 0; x < 32; ++x)
             if (x != 5 || y != 5) {
@@ -230,8 +235,8 @@ TEST(CompositeDifferential, ObjectsGetTheCodesOfThePhotographsPrimaries)
     const glm::dvec3 red(20.0, 4.0, 2.0);  // inside both
     layers.object(5, 5) = Rgb(red);
     layers.alpha(5, 5) = 1.0f;
-    const Composite composite =
-        compositeDifferential(photo, ResponseCurve::srgb(), kExposure, layers, {}, kRec709FromP3);
+    const Composite composite = compositeDifferential(
+        photo, ResponseCurve::srgb(), kExposure, matchLayers(layers, {}), {}, kRec709FromP3);
     const glm::dvec3 wide = glm::inverse(kRec709FromP3) * red;
     for (int c = 0; c < 3; ++c) {
         const double code = ResponseCurve::srgb().encode(c, wide[c] * kExposure) * 257.0;

@@ -174,7 +174,7 @@ TEST(Foreground, ObjectsAndShadowsAreCompositedUnderIt)
 {
     const DiscScene scene;
     const Rgb color(0.4f, 0.1f, 0.3f);
-    RenderLayers layers = halfObject(color);
+    PhotoLayers layers = matchLayers(halfObject(color), {});
     putBehindForeground(scene.coverage, std::nullopt, scene.before, layers);
     const Composite composite =
         compositeDifferential(scene.photo, ResponseCurve::srgb(), 1.0, layers, CompositeOptions{});
@@ -222,12 +222,12 @@ TEST(Foreground, ASofterMarkThanThePictureLeavesNoDarkSeam)
     mark.feather_px = 1.2;
     const auto composed = [&](int refine_px) {
         mark.refine_px = refine_px;
-        RenderLayers layers = halfObject(color);
+        PhotoLayers layers = matchLayers(halfObject(color), {});
         putBehindForeground(foregroundCoverage(mark, photo), std::nullopt, seen, layers);
         Image<Rgb> result(kWidth, kHeight);
         for (std::size_t i = 0; i < result.pixelCount(); ++i)
             result.pixels()[i] =
-                layers.object.pixels()[i] + (1.0f - layers.alpha.pixels()[i]) * seen.pixels()[i];
+                layers.object.pixels()[i] + (1.0f - layers.coverage.pixels()[i]) * seen.pixels()[i];
         return result;
     };
     const Image<Rgb> soft = composed(0);
@@ -242,17 +242,39 @@ TEST(Foreground, ASofterMarkThanThePictureLeavesNoDarkSeam)
         }
 }
 
+TEST(Foreground, TheCamerasBlurDoesNotReachOverIt)
+{
+    // The disc's edge is the photograph's own; an object behind it is blurred before it is hidden.
+    const DiscScene scene;
+    CameraMatch match;
+    match.blur_px = 1.5;
+    const RenderLayers sharp = halfObject(Rgb(0.4f, 0.1f, 0.3f));
+    PhotoLayers layers = matchLayers(sharp, match);
+    EXPECT_GT(layers.coverage(58, 5).g, 0.0f) << "the object's own edge is soft";
+    putBehindForeground(scene.coverage, std::nullopt, scene.before, layers);
+    const Composite composite = compositeDifferential(
+        scene.photo, ResponseCurve::srgb(), 1.0, layers, {}, glm::dmat3(1.0), match);
+    int covered = 0;
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 60; x < kWidth; ++x) {
+            if (scene.coverage(x, y) < 1.0f) continue;
+            ++covered;
+            ASSERT_EQ(composite.image.codes(x, y), scene.photo.codes(x, y)) << x << " " << y;
+        }
+    EXPECT_GT(covered, 100);
+}
+
 TEST(Foreground, WhatIsNearerStaysBefore)
 {
     const DiscScene scene;
-    const RenderLayers untouched = halfObject(Rgb(0.4f));
-    RenderLayers layers = untouched;
+    const PhotoLayers untouched = matchLayers(halfObject(Rgb(0.4f)), {});
+    PhotoLayers layers = untouched;
     putBehindForeground(scene.coverage, 4.0, scene.before, layers);  // the object is at 3 m
-    EXPECT_EQ(meanError(layers.alpha, untouched.alpha), 0.0);
+    EXPECT_EQ(layers.coverage, untouched.coverage);
     EXPECT_EQ(layers.object(70, 40), untouched.object(70, 40));
     EXPECT_EQ(layers.irradiance_with(50, 40), Rgb(1.0f));  // the disc itself is not shadowed
     putBehindForeground(scene.coverage, 2.0, scene.before, layers);
-    EXPECT_EQ(layers.alpha(70, 40), 0.0f);
+    EXPECT_EQ(layers.coverage(70, 40), Rgb(0.0f));
 }
 
 TEST(Foreground, OptionsAreChecked)

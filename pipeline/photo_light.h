@@ -1,0 +1,41 @@
+#pragma once
+
+#include "lighting/room_light.h"
+#include "pipeline/insert.h"
+#include "reconstruct/scene_proxy.h"
+
+#include <glm/glm.hpp>
+
+#include <optional>
+#include <vector>
+
+namespace insitu {
+
+// What insertObjects and projectRadianceMesh share of the photograph: each reads what the stages
+// before it left in `result` and adds its findings to it.
+
+/// The photograph is a single exposure: its response is the probe's when one camera took both.
+/// Findings: "photo-response-assumed-srgb". InputError: no exposure time where the probe's is
+/// known.
+void choosePhotoResponse(const Project& project, InsertResult& result);
+
+/// The photograph's light, and the same in the light probe's exposure and white balance for the
+/// stages that make the room's light from both: nothing where their units cannot be compared.
+struct PhotoLight {
+    Image<Rgb> taken;
+    std::optional<PhotographedRadiance> in_probe_unit;
+};
+
+/// Measures and chooses `result.balance` on the way.
+[[nodiscard]] PhotoLight photoLight(const Project& project,
+                                    const SceneProxy& proxy,
+                                    const glm::dmat3& primaries,
+                                    InsertResult& result);
+
+/// What probe, numbers and photograph tell of the light; the last where both share a unit.
+[[nodiscard]] std::vector<ReferenceGroup> allReferences(
+    const Project& project,
+    const std::optional<PhotographedRadiance>& photographed,
+    InsertResult& result);
+
+}  // namespace insitu
