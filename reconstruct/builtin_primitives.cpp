@@ -1,172 +1,193 @@
 #include "reconstruct/primitive_library.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
 namespace insitu {
 
-// A table of constants in the form of a library file.
+namespace {
+
+struct Parameter {
+    const char* name;
+    double initial;
+};
+
+/// Coordinates are linear expressions of the parameters, as in a library file.
+struct Vertex {
+    std::string name, x, y, z;
+};
+
+/// Corners counter-clockwise as seen from the side that shows.
+struct Face {
+    std::string name;
+    std::vector<std::string> corners;
+};
+
+struct Shape {
+    const char* name;
+    const char* note;
+    std::vector<Parameter> parameters;
+    std::vector<Vertex> vertices;
+    std::vector<Face> faces;
+    /// Members beside these, with a comma after each.
+    const char* more = "";
+};
+
+/// A shape in the form of docs/file_format.md, one vertex and one face a line.
+std::string shapeText(const Shape& shape)
+{
+    std::vector<std::string> parameters;
+    std::vector<std::string> vertices;
+    std::vector<std::string> faces;
+    for (const Parameter& p : shape.parameters)
+        parameters.push_back(fmt::format(R"({{"name": "{}", "default": {}}})", p.name, p.initial));
+    for (const Vertex& v : shape.vertices)
+        vertices.push_back(
+            fmt::format(R"({{"name": "{}", "at": ["{}", "{}", "{}"]}})", v.name, v.x, v.y, v.z));
+    for (const Face& f : shape.faces)
+        faces.push_back(fmt::format(
+            R"({{"name": "{}", "corners": ["{}"]}})", f.name, fmt::join(f.corners, R"(", ")")));
+    return fmt::format(R"(    {{"name": "{}", "note": "{}",
+     "parameters": [{}],
+     "vertices": [
+       {}],
+     {}"faces": [
+       {}]}})",
+                       shape.name,
+                       shape.note,
+                       fmt::join(parameters, ", "),
+                       fmt::join(vertices, ",\n       "),
+                       shape.more,
+                       fmt::join(faces, ",\n       "));
+}
+
+constexpr const char* kSurface = "\"two_sided\": true, \"solid\": false,\n     ";
+constexpr const char* kInside = "\"solid\": false,\n     ";
+
+const std::vector<Parameter> kUnitBox{{"width_m", 1}, {"height_m", 1}, {"depth_m", 1}};
+
+/// A rectangle's corners about the middle of its lower edge or, lying, about its own.
+std::vector<Vertex> base(const std::string& name, const std::string& y)
+{
+    return {{name + "back_left", "-width_m/2", y, "-depth_m/2"},
+            {name + "back_right", "width_m/2", y, "-depth_m/2"},
+            {name + "front_left", "-width_m/2", y, "depth_m/2"},
+            {name + "front_right", "width_m/2", y, "depth_m/2"}};
+}
+
+std::vector<Vertex> boxVertices()
+{
+    std::vector<Vertex> vertices = base("bottom_", "0");
+    for (Vertex& vertex : base("top_", "height_m"))
+        vertices.push_back(std::move(vertex));
+    return vertices;
+}
+
+const std::vector<Face> kBoxFaces{
+    {"bottom",
+     {"bottom_back_left", "bottom_back_right", "bottom_front_right", "bottom_front_left"}},
+    {"top", {"top_back_left", "top_front_left", "top_front_right", "top_back_right"}},
+    {"back", {"bottom_back_left", "top_back_left", "top_back_right", "bottom_back_right"}},
+    {"front", {"bottom_front_left", "bottom_front_right", "top_front_right", "top_front_left"}},
+    {"left", {"bottom_back_left", "bottom_front_left", "top_front_left", "top_back_left"}},
+    {"right", {"bottom_back_right", "top_back_right", "top_front_right", "bottom_front_right"}}};
+
+Shape roomBox()
+{
+    std::vector<Face> faces = kBoxFaces;
+    for (Face& face : faces)
+        std::reverse(face.corners.begin(), face.corners.end());
+    faces[0].name = "floor";
+    faces[1].name = "ceiling";
+    return {"room-box",
+            "the room, seen from inside",
+            {{"width_m", 4}, {"height_m", 2.5}, {"depth_m", 5}},
+            boxVertices(),
+            faces,
+            kInside};
+}
+
+Shape wedge()
+{
+    std::vector<Vertex> vertices = base("bottom_", "0");
+    vertices.push_back({"top_left", "-width_m/2", "height_m", "-depth_m/2"});
+    vertices.push_back({"top_right", "width_m/2", "height_m", "-depth_m/2"});
+    return {"wedge",
+            "slopes from the top of its back down to the front",
+            kUnitBox,
+            vertices,
+            {kBoxFaces[0],
+             {"back", {"bottom_back_left", "top_left", "top_right", "bottom_back_right"}},
+             {"slope", {"bottom_front_left", "bottom_front_right", "top_right", "top_left"}},
+             {"left", {"bottom_back_left", "bottom_front_left", "top_left"}},
+             {"right", {"bottom_back_right", "top_right", "bottom_front_right"}}}};
+}
+
+Shape cylinder()
+{
+    constexpr int kSides = 24;
+    Shape shape{"cylinder",
+                "upright, with 24 sides; its corners lie on the circle",
+                {{"radius_m", 0.5}, {"height_m", 1}},
+                {},
+                {{"bottom", {}}, {"top", {}}}};
+    const auto name = [](const char* ring, int i) {
+        return fmt::format("{}_{}", ring, i % kSides);
+    };
+    for (const auto& [ring, y] : {std::pair{"bottom", "0"}, std::pair{"top", "height_m"}})
+        for (int i = 0; i < kSides; ++i) {
+            const double angle = 2.0 * std::numbers::pi * i / kSides;
+            // Rounded, so that a quarter turn is 0; + 0.0 takes the sign off it.
+            const auto share = [](double s) {
+                return fmt::format("{:.15g}*radius_m", std::round(s * 1e15) / 1e15 + 0.0);
+            };
+            shape.vertices.push_back(
+                {name(ring, i), share(std::cos(angle)), y, share(std::sin(angle))});
+        }
+    for (int i = 0; i < kSides; ++i) {
+        shape.faces[0].corners.push_back(name("bottom", i));
+        shape.faces[1].corners.push_back(name("top", kSides - 1 - i));
+        shape.faces.push_back(
+            {fmt::format("side_{}", i),
+             {name("bottom", i), name("top", i), name("top", i + 1), name("bottom", i + 1)}});
+    }
+    return shape;
+}
+
+}  // namespace
+
 const std::string& builtinPrimitivesText()
 {
-    static const std::string text = R"json({"format": "insitu-primitives", "version": 1,
-  "primitives": [
-    {"name": "plane", "note": "a horizontal rectangle",
-     "parameters": [{"name": "width_m", "default": 2},
-                    {"name": "depth_m", "default": 2}],
-     "vertices": [
-       {"name": "back_left", "at": ["-width_m/2", 0, "-depth_m/2"]},
-       {"name": "back_right", "at": ["width_m/2", 0, "-depth_m/2"]},
-       {"name": "front_left", "at": ["-width_m/2", 0, "depth_m/2"]},
-       {"name": "front_right", "at": ["width_m/2", 0, "depth_m/2"]}],
-     "two_sided": true, "solid": false,
-     "faces": [
-       {"name": "top", "corners": ["back_left", "front_left", "front_right", "back_right"]}]},
-    {"name": "panel", "note": "an upright rectangle",
-     "parameters": [{"name": "width_m", "default": 2},
-                    {"name": "height_m", "default": 2}],
-     "vertices": [
-       {"name": "bottom_left", "at": ["-width_m/2", 0, 0]},
-       {"name": "bottom_right", "at": ["width_m/2", 0, 0]},
-       {"name": "top_left", "at": ["-width_m/2", "height_m", 0]},
-       {"name": "top_right", "at": ["width_m/2", "height_m", 0]}],
-     "two_sided": true, "solid": false,
-     "faces": [
-       {"name": "front", "corners": ["bottom_left", "bottom_right", "top_right", "top_left"]}]},
-    {"name": "box", "note": "seen from outside",
-     "parameters": [{"name": "width_m", "default": 1},
-                    {"name": "height_m", "default": 1},
-                    {"name": "depth_m", "default": 1}],
-     "vertices": [
-       {"name": "bottom_back_left", "at": ["-width_m/2", 0, "-depth_m/2"]},
-       {"name": "bottom_back_right", "at": ["width_m/2", 0, "-depth_m/2"]},
-       {"name": "bottom_front_left", "at": ["-width_m/2", 0, "depth_m/2"]},
-       {"name": "bottom_front_right", "at": ["width_m/2", 0, "depth_m/2"]},
-       {"name": "top_back_left", "at": ["-width_m/2", "height_m", "-depth_m/2"]},
-       {"name": "top_back_right", "at": ["width_m/2", "height_m", "-depth_m/2"]},
-       {"name": "top_front_left", "at": ["-width_m/2", "height_m", "depth_m/2"]},
-       {"name": "top_front_right", "at": ["width_m/2", "height_m", "depth_m/2"]}],
-     "faces": [
-       {"name": "bottom", "corners": ["bottom_back_left", "bottom_back_right", "bottom_front_right", "bottom_front_left"]},
-       {"name": "top", "corners": ["top_back_left", "top_front_left", "top_front_right", "top_back_right"]},
-       {"name": "back", "corners": ["bottom_back_left", "top_back_left", "top_back_right", "bottom_back_right"]},
-       {"name": "front", "corners": ["bottom_front_left", "bottom_front_right", "top_front_right", "top_front_left"]},
-       {"name": "left", "corners": ["bottom_back_left", "bottom_front_left", "top_front_left", "top_back_left"]},
-       {"name": "right", "corners": ["bottom_back_right", "top_back_right", "top_front_right", "bottom_front_right"]}]},
-    {"name": "room-box", "note": "the room, seen from inside",
-     "parameters": [{"name": "width_m", "default": 4},
-                    {"name": "height_m", "default": 2.5},
-                    {"name": "depth_m", "default": 5}],
-     "vertices": [
-       {"name": "bottom_back_left", "at": ["-width_m/2", 0, "-depth_m/2"]},
-       {"name": "bottom_back_right", "at": ["width_m/2", 0, "-depth_m/2"]},
-       {"name": "bottom_front_left", "at": ["-width_m/2", 0, "depth_m/2"]},
-       {"name": "bottom_front_right", "at": ["width_m/2", 0, "depth_m/2"]},
-       {"name": "top_back_left", "at": ["-width_m/2", "height_m", "-depth_m/2"]},
-       {"name": "top_back_right", "at": ["width_m/2", "height_m", "-depth_m/2"]},
-       {"name": "top_front_left", "at": ["-width_m/2", "height_m", "depth_m/2"]},
-       {"name": "top_front_right", "at": ["width_m/2", "height_m", "depth_m/2"]}],
-     "solid": false,
-     "faces": [
-       {"name": "floor", "corners": ["bottom_front_left", "bottom_front_right", "bottom_back_right", "bottom_back_left"]},
-       {"name": "ceiling", "corners": ["top_back_right", "top_front_right", "top_front_left", "top_back_left"]},
-       {"name": "back", "corners": ["bottom_back_right", "top_back_right", "top_back_left", "bottom_back_left"]},
-       {"name": "front", "corners": ["top_front_left", "top_front_right", "bottom_front_right", "bottom_front_left"]},
-       {"name": "left", "corners": ["top_back_left", "top_front_left", "bottom_front_left", "bottom_back_left"]},
-       {"name": "right", "corners": ["bottom_front_right", "top_front_right", "top_back_right", "bottom_back_right"]}]},
-    {"name": "wedge", "note": "slopes from the top of its back down to the front",
-     "parameters": [{"name": "width_m", "default": 1},
-                    {"name": "height_m", "default": 1},
-                    {"name": "depth_m", "default": 1}],
-     "vertices": [
-       {"name": "bottom_back_left", "at": ["-width_m/2", 0, "-depth_m/2"]},
-       {"name": "bottom_back_right", "at": ["width_m/2", 0, "-depth_m/2"]},
-       {"name": "bottom_front_left", "at": ["-width_m/2", 0, "depth_m/2"]},
-       {"name": "bottom_front_right", "at": ["width_m/2", 0, "depth_m/2"]},
-       {"name": "top_left", "at": ["-width_m/2", "height_m", "-depth_m/2"]},
-       {"name": "top_right", "at": ["width_m/2", "height_m", "-depth_m/2"]}],
-     "faces": [
-       {"name": "bottom", "corners": ["bottom_back_left", "bottom_back_right", "bottom_front_right", "bottom_front_left"]},
-       {"name": "back", "corners": ["bottom_back_left", "top_left", "top_right", "bottom_back_right"]},
-       {"name": "slope", "corners": ["bottom_front_left", "bottom_front_right", "top_right", "top_left"]},
-       {"name": "left", "corners": ["bottom_back_left", "bottom_front_left", "top_left"]},
-       {"name": "right", "corners": ["bottom_back_right", "top_right", "bottom_front_right"]}]},
-    {"name": "cylinder", "note": "upright, with 24 sides; its corners lie on the circle",
-     "parameters": [{"name": "radius_m", "default": 0.5},
-                    {"name": "height_m", "default": 1}],
-     "vertices": [
-       {"name": "bottom_0", "at": ["1*radius_m", 0, 0]},
-       {"name": "bottom_1", "at": ["0.96592582628906831*radius_m", 0, "0.25881904510252074*radius_m"]},
-       {"name": "bottom_2", "at": ["0.86602540378443871*radius_m", 0, "0.49999999999999994*radius_m"]},
-       {"name": "bottom_3", "at": ["0.70710678118654757*radius_m", 0, "0.70710678118654746*radius_m"]},
-       {"name": "bottom_4", "at": ["0.50000000000000011*radius_m", 0, "0.8660254037844386*radius_m"]},
-       {"name": "bottom_5", "at": ["0.25881904510252074*radius_m", 0, "0.96592582628906831*radius_m"]},
-       {"name": "bottom_6", "at": [0, 0, "1*radius_m"]},
-       {"name": "bottom_7", "at": ["-0.25881904510252063*radius_m", 0, "0.96592582628906831*radius_m"]},
-       {"name": "bottom_8", "at": ["-0.49999999999999978*radius_m", 0, "0.86602540378443871*radius_m"]},
-       {"name": "bottom_9", "at": ["-0.70710678118654746*radius_m", 0, "0.70710678118654757*radius_m"]},
-       {"name": "bottom_10", "at": ["-0.86602540378443871*radius_m", 0, "0.49999999999999994*radius_m"]},
-       {"name": "bottom_11", "at": ["-0.9659258262890682*radius_m", 0, "0.25881904510252102*radius_m"]},
-       {"name": "bottom_12", "at": ["-1*radius_m", 0, 0]},
-       {"name": "bottom_13", "at": ["-0.96592582628906831*radius_m", 0, "-0.25881904510252079*radius_m"]},
-       {"name": "bottom_14", "at": ["-0.86602540378443882*radius_m", 0, "-0.49999999999999972*radius_m"]},
-       {"name": "bottom_15", "at": ["-0.70710678118654791*radius_m", 0, "-0.70710678118654713*radius_m"]},
-       {"name": "bottom_16", "at": ["-0.50000000000000044*radius_m", 0, "-0.86602540378443837*radius_m"]},
-       {"name": "bottom_17", "at": ["-0.25881904510252063*radius_m", 0, "-0.96592582628906831*radius_m"]},
-       {"name": "bottom_18", "at": [0, 0, "-1*radius_m"]},
-       {"name": "bottom_19", "at": ["0.2588190451025203*radius_m", 0, "-0.96592582628906842*radius_m"]},
-       {"name": "bottom_20", "at": ["0.50000000000000011*radius_m", 0, "-0.8660254037844386*radius_m"]},
-       {"name": "bottom_21", "at": ["0.70710678118654735*radius_m", 0, "-0.70710678118654768*radius_m"]},
-       {"name": "bottom_22", "at": ["0.86602540378443837*radius_m", 0, "-0.50000000000000044*radius_m"]},
-       {"name": "bottom_23", "at": ["0.96592582628906809*radius_m", 0, "-0.25881904510252157*radius_m"]},
-       {"name": "top_0", "at": ["1*radius_m", "height_m", 0]},
-       {"name": "top_1", "at": ["0.96592582628906831*radius_m", "height_m", "0.25881904510252074*radius_m"]},
-       {"name": "top_2", "at": ["0.86602540378443871*radius_m", "height_m", "0.49999999999999994*radius_m"]},
-       {"name": "top_3", "at": ["0.70710678118654757*radius_m", "height_m", "0.70710678118654746*radius_m"]},
-       {"name": "top_4", "at": ["0.50000000000000011*radius_m", "height_m", "0.8660254037844386*radius_m"]},
-       {"name": "top_5", "at": ["0.25881904510252074*radius_m", "height_m", "0.96592582628906831*radius_m"]},
-       {"name": "top_6", "at": [0, "height_m", "1*radius_m"]},
-       {"name": "top_7", "at": ["-0.25881904510252063*radius_m", "height_m", "0.96592582628906831*radius_m"]},
-       {"name": "top_8", "at": ["-0.49999999999999978*radius_m", "height_m", "0.86602540378443871*radius_m"]},
-       {"name": "top_9", "at": ["-0.70710678118654746*radius_m", "height_m", "0.70710678118654757*radius_m"]},
-       {"name": "top_10", "at": ["-0.86602540378443871*radius_m", "height_m", "0.49999999999999994*radius_m"]},
-       {"name": "top_11", "at": ["-0.9659258262890682*radius_m", "height_m", "0.25881904510252102*radius_m"]},
-       {"name": "top_12", "at": ["-1*radius_m", "height_m", 0]},
-       {"name": "top_13", "at": ["-0.96592582628906831*radius_m", "height_m", "-0.25881904510252079*radius_m"]},
-       {"name": "top_14", "at": ["-0.86602540378443882*radius_m", "height_m", "-0.49999999999999972*radius_m"]},
-       {"name": "top_15", "at": ["-0.70710678118654791*radius_m", "height_m", "-0.70710678118654713*radius_m"]},
-       {"name": "top_16", "at": ["-0.50000000000000044*radius_m", "height_m", "-0.86602540378443837*radius_m"]},
-       {"name": "top_17", "at": ["-0.25881904510252063*radius_m", "height_m", "-0.96592582628906831*radius_m"]},
-       {"name": "top_18", "at": [0, "height_m", "-1*radius_m"]},
-       {"name": "top_19", "at": ["0.2588190451025203*radius_m", "height_m", "-0.96592582628906842*radius_m"]},
-       {"name": "top_20", "at": ["0.50000000000000011*radius_m", "height_m", "-0.8660254037844386*radius_m"]},
-       {"name": "top_21", "at": ["0.70710678118654735*radius_m", "height_m", "-0.70710678118654768*radius_m"]},
-       {"name": "top_22", "at": ["0.86602540378443837*radius_m", "height_m", "-0.50000000000000044*radius_m"]},
-       {"name": "top_23", "at": ["0.96592582628906809*radius_m", "height_m", "-0.25881904510252157*radius_m"]}],
-     "faces": [
-       {"name": "bottom", "corners": ["bottom_0", "bottom_1", "bottom_2", "bottom_3", "bottom_4", "bottom_5", "bottom_6", "bottom_7", "bottom_8", "bottom_9", "bottom_10", "bottom_11", "bottom_12", "bottom_13", "bottom_14", "bottom_15", "bottom_16", "bottom_17", "bottom_18", "bottom_19", "bottom_20", "bottom_21", "bottom_22", "bottom_23"]},
-       {"name": "top", "corners": ["top_23", "top_22", "top_21", "top_20", "top_19", "top_18", "top_17", "top_16", "top_15", "top_14", "top_13", "top_12", "top_11", "top_10", "top_9", "top_8", "top_7", "top_6", "top_5", "top_4", "top_3", "top_2", "top_1", "top_0"]},
-       {"name": "side_0", "corners": ["bottom_0", "top_0", "top_1", "bottom_1"]},
-       {"name": "side_1", "corners": ["bottom_1", "top_1", "top_2", "bottom_2"]},
-       {"name": "side_2", "corners": ["bottom_2", "top_2", "top_3", "bottom_3"]},
-       {"name": "side_3", "corners": ["bottom_3", "top_3", "top_4", "bottom_4"]},
-       {"name": "side_4", "corners": ["bottom_4", "top_4", "top_5", "bottom_5"]},
-       {"name": "side_5", "corners": ["bottom_5", "top_5", "top_6", "bottom_6"]},
-       {"name": "side_6", "corners": ["bottom_6", "top_6", "top_7", "bottom_7"]},
-       {"name": "side_7", "corners": ["bottom_7", "top_7", "top_8", "bottom_8"]},
-       {"name": "side_8", "corners": ["bottom_8", "top_8", "top_9", "bottom_9"]},
-       {"name": "side_9", "corners": ["bottom_9", "top_9", "top_10", "bottom_10"]},
-       {"name": "side_10", "corners": ["bottom_10", "top_10", "top_11", "bottom_11"]},
-       {"name": "side_11", "corners": ["bottom_11", "top_11", "top_12", "bottom_12"]},
-       {"name": "side_12", "corners": ["bottom_12", "top_12", "top_13", "bottom_13"]},
-       {"name": "side_13", "corners": ["bottom_13", "top_13", "top_14", "bottom_14"]},
-       {"name": "side_14", "corners": ["bottom_14", "top_14", "top_15", "bottom_15"]},
-       {"name": "side_15", "corners": ["bottom_15", "top_15", "top_16", "bottom_16"]},
-       {"name": "side_16", "corners": ["bottom_16", "top_16", "top_17", "bottom_17"]},
-       {"name": "side_17", "corners": ["bottom_17", "top_17", "top_18", "bottom_18"]},
-       {"name": "side_18", "corners": ["bottom_18", "top_18", "top_19", "bottom_19"]},
-       {"name": "side_19", "corners": ["bottom_19", "top_19", "top_20", "bottom_20"]},
-       {"name": "side_20", "corners": ["bottom_20", "top_20", "top_21", "bottom_21"]},
-       {"name": "side_21", "corners": ["bottom_21", "top_21", "top_22", "bottom_22"]},
-       {"name": "side_22", "corners": ["bottom_22", "top_22", "top_23", "bottom_23"]},
-       {"name": "side_23", "corners": ["bottom_23", "top_23", "top_0", "bottom_0"]}]}]}
-)json";
+    static const std::string text = [] {
+        const Shape plane{"plane",
+                          "a horizontal rectangle",
+                          {{"width_m", 2}, {"depth_m", 2}},
+                          base("", "0"),
+                          {{"top", {"back_left", "front_left", "front_right", "back_right"}}},
+                          kSurface};
+        const Shape panel{"panel",
+                          "an upright rectangle",
+                          {{"width_m", 2}, {"height_m", 2}},
+                          {{"bottom_left", "-width_m/2", "0", "0"},
+                           {"bottom_right", "width_m/2", "0", "0"},
+                           {"top_left", "-width_m/2", "height_m", "0"},
+                           {"top_right", "width_m/2", "height_m", "0"}},
+                          {{"front", {"bottom_left", "bottom_right", "top_right", "top_left"}}},
+                          kSurface};
+        const Shape box{"box", "seen from outside", kUnitBox, boxVertices(), kBoxFaces};
+        std::vector<std::string> shapes;
+        for (const Shape& shape : {plane, panel, box, roomBox(), wedge(), cylinder()})
+            shapes.push_back(shapeText(shape));
+        return fmt::format(
+            "{{\"format\": \"insitu-primitives\", \"version\": 1,\n"
+            "  \"primitives\": [\n{}]}}\n",
+            fmt::join(shapes, ",\n"));
+    }();
     return text;
 }
 
