@@ -2,6 +2,7 @@
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "tests/cli/run_program.h"
+#include "tests/support/file_bytes.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -19,12 +20,6 @@ const std::vector<std::string> kCommands = {INSITU_COMMANDS};
 void writeText(const std::filesystem::path& path, const std::string& text)
 {
     std::ofstream(path) << text;
-}
-
-std::string textOf(const std::filesystem::path& path)
-{
-    std::ifstream stream(path);
-    return std::string(std::istreambuf_iterator<char>(stream), {});
 }
 
 EncodedImage grey(int width, int height, std::uint16_t code)
@@ -118,7 +113,7 @@ TEST(Tonemap, MakesAPictureAndOverwritesOnlyWhenForced)
     const ProgramRun refused = runProgram(arguments);
     EXPECT_EQ(refused.exit_code, kFailed);
     EXPECT_THAT(refused.messages, HasSubstr("--force"));
-    EXPECT_EQ(textOf(folder / "out.png"), "mine");
+    EXPECT_EQ(fileBytes(folder / "out.png"), "mine");
 
     std::vector<std::string> forced = arguments;
     forced.push_back("--force");
@@ -133,7 +128,7 @@ TEST(Tonemap, FailedRunLeavesNothingBehind)
 {
     const TemporaryFolder folder;
     writeRadiance(folder / "in.exr", Image<Rgb>(6, 5, Rgb(3.0f)));
-    const std::string good = textOf(folder / "in.exr");
+    const std::string good = fileBytes(folder / "in.exr");
     writeText(folder / "broken.exr", good.substr(0, good.size() / 2));
     writeText(folder / "out.png", "mine");
     const ProgramRun run = runProgram({"tonemap",
@@ -143,7 +138,7 @@ TEST(Tonemap, FailedRunLeavesNothingBehind)
                                        "--force"});
     EXPECT_EQ(run.exit_code, kFailed);
     EXPECT_THAT(run.messages, HasSubstr("broken.exr"));
-    EXPECT_EQ(textOf(folder / "out.png"), "mine");
+    EXPECT_EQ(fileBytes(folder / "out.png"), "mine");
 
     const ProgramRun odd =
         runProgram({"tonemap", (folder / "in.exr").string(), "-o", (folder / "out.docx").string()});
@@ -204,7 +199,7 @@ TEST(Compare, JudgesEncodedPicturesAsTheyAreSeen)
                            "--force"});
     };
     EXPECT_EQ(run("a.png", "b.png").exit_code, kDone);
-    const auto json = nlohmann::json::parse(textOf(folder / "out.json"));
+    const auto json = nlohmann::json::parse(fileBytes(folder / "out.json"));
     // Plain pictures: (2ab + C1) / (a² + b² + C1) with a, b in codes, C1 = (0.01·255)².
     EXPECT_NEAR(json.at("ssim").get<double>(), 24006.5 / 24406.5, 1e-4);
     EXPECT_EQ(json.at("vdp_percent").get<double>(), 0.0);  // the mean level is not judged

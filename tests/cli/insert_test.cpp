@@ -1,5 +1,6 @@
 #include "tests/cli/json_file.h"
 #include "tests/cli/run_program.h"
+#include "tests/support/file_bytes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,12 +17,6 @@ using Json = nlohmann::ordered_json;
 using ::testing::HasSubstr;
 
 const fs::path kSample = fs::path(INSITU_SOURCE_DIR) / "samples" / "simulated-room";
-
-std::string bytesOf(const fs::path& path)
-{
-    std::ifstream stream(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 /// The shipped sample, with its paths made absolute and one thing changed.
 class InsertProject : public ::testing::Test {
@@ -115,14 +110,14 @@ TEST_F(InsertProject, ASecondRunFindsTheStagesOfTheFirst)
 
     ASSERT_EQ(insert(more).exit_code, 0);
     EXPECT_EQ(readJsonFile(report)["from_cache"], Json({"probe", "render"}));
-    EXPECT_EQ(bytesOf(picture()), bytesOf(first));
+    EXPECT_EQ(fileBytes(picture()), fileBytes(first));
 
     // Another place for the object: the light is the same, the picture is not.
     project_["objects"][0]["rotation_y_deg"] = 12.0;
     ASSERT_EQ(insert(more).exit_code, 0);
     EXPECT_EQ(readJsonFile(report)["from_cache"], Json({"probe"}));
-    EXPECT_NE(bytesOf(picture()), bytesOf(first));
-    const std::string turned = bytesOf(picture());
+    EXPECT_NE(fileBytes(picture()), fileBytes(first));
+    const std::string turned = fileBytes(picture());
 
     // What the photograph's camera does to the objects can be left out; it is no part of the
     // render.
@@ -134,7 +129,7 @@ TEST_F(InsertProject, ASecondRunFindsTheStagesOfTheFirst)
     EXPECT_EQ(told["camera_match"]["grain_codes_at_middle_grey"], Json({0.0, 0.0, 0.0}));
     EXPECT_EQ(told["camera_match"]["blur_px"], 0.0);
     EXPECT_EQ(told["composite"]["form"], "mixed");
-    EXPECT_NE(bytesOf(picture()), turned);
+    EXPECT_NE(fileBytes(picture()), turned);
 }
 
 TEST_F(InsertProject, ABadProjectEndsWithItsPlaceCauseAndExitCode)

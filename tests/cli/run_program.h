@@ -1,12 +1,11 @@
 #pragma once
 
+#include "tests/support/file_bytes.h"
 #include "tests/support/temporary_folder.h"
 
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -30,11 +29,9 @@ inline ProgramRun runProgram(const std::vector<std::string>& arguments)
         command += " '" + argument + "'";
     command += " >'" + (scratch / "out").string() + "' 2>'" + (scratch / "err").string() + "'";
     const int status = std::system(command.c_str());
-    const auto textOf = [&](const char* name) {
-        std::ifstream stream(scratch / name);
-        return std::string(std::istreambuf_iterator<char>(stream), {});
-    };
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, textOf("out"), textOf("err")};
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
+            fileBytes(scratch / "out"),
+            fileBytes(scratch / "err")};
 }
 
 }  // namespace insitu
