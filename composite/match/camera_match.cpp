@@ -185,14 +185,24 @@ CameraMatchEstimate estimateCameraMatch(const EncodedImage& photo,
     std::vector<EdgeProfile> edges;
     if (options.blur || options.chromatic_aberration || find_focus)
         edges = edgeProfiles(radiance, usable);
+    if (focus && options.focus_m)
+        match.depth_of_field = DepthOfField{camera.aperture_px_m, *options.focus_m};
+    else if (find_focus)
+        match.depth_of_field = estimateFocus(edges, depth_m, camera.aperture_px_m);
     if (options.blur) {
         estimate.blur = estimateBlur(edges);
         append(estimate.findings, estimate.blur.findings);
+        // Edges out of focus are part of the above; the lens has them by itself.
+        if (match.depth_of_field)
+            estimate.blur.sigma_px =
+                blurInFocus(edges, depth_m, *match.depth_of_field).value_or(estimate.blur.sigma_px);
         if (estimate.blur.sigma_px >= kVisibleBlur) {
             match.blur_px = estimate.blur.sigma_px;
             told.push_back(fmt::format("blur of {:.2f} px", match.blur_px));
         }
     }
+    if (match.depth_of_field)
+        told.push_back(fmt::format("focus at {:.2f} m", match.depth_of_field->focus_m));
     if (options.chromatic_aberration) {
         estimate.aberration = estimateChromaticAberration(edges, camera.principal_px);
         if (estimate.aberration.significant) {
@@ -213,12 +223,6 @@ CameraMatchEstimate estimateCameraMatch(const EncodedImage& photo,
     if (match.vignetting.a != 0.0)
         told.push_back(fmt::format("corners darker by {:.0f} %",
                                    100.0 * (1.0 - match.vignetting.factor(1.0))));
-    if (focus && options.focus_m)
-        match.depth_of_field = DepthOfField{camera.aperture_px_m, *options.focus_m};
-    else if (find_focus)
-        match.depth_of_field = estimateFocus(edges, depth_m, camera.aperture_px_m);
-    if (match.depth_of_field)
-        told.push_back(fmt::format("focus at {:.2f} m", match.depth_of_field->focus_m));
     if (!told.empty())
         estimate.findings.push_back(
             {Severity::Info,

@@ -46,13 +46,20 @@ struct DepthOfField {
     /// Standard deviation of the disc along one axis, pixels; `depth_m` > 0.
     [[nodiscard]] double sigmaAt(double depth_m) const;
 };
-/// Where the lens was focused, from how sharp edges at known depths are:
-///     spread² = s² + (diameter/4)² (1/depth − 1/focus)², least squares, robust.
-/// `depth_m` has the photograph's size; <= 0 is unknown. Nothing when fewer than 30 edges lie at
-/// known depths, or the depths do not change the sharpness by more than three deviations.
+/// Where the lens was focused, from how sharp the sharpest quarter of the edges is at each depth:
+///     spread² = s² + (diameter/4)² (1/depth − 1/focus)²,
+/// a regression of quantiles [KoeBas78], focus at or beyond the nearest edge. `depth_m` has the
+/// photograph's size; <= 0 is unknown. Nothing when fewer than 30 edges lie at known depths, when
+/// no defocus shows (half a pixel), when parts of the picture disagree by that much, or when one
+/// sharpness explains the edges as well.
 [[nodiscard]] std::optional<DepthOfField> estimateFocus(const std::vector<EdgeProfile>& edges,
                                                         const Image<float>& depth_m,
                                                         double diameter_px);
+/// How sharp what is in focus is under that lens, by the same edges: standard deviation of the
+/// blur, pixels, pixel's box taken off. Nothing when fewer than 30 edges lie at known depths.
+[[nodiscard]] std::optional<double> blurInFocus(const std::vector<EdgeProfile>& edges,
+                                                const Image<float>& depth_m,
+                                                const DepthOfField& lens);
 
 /// What the photograph's camera does to light, to be done to rendered layers too. The default does
 /// nothing.

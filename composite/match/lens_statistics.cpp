@@ -1,6 +1,5 @@
 #include "composite/match/camera_match.h"
 #include "core/color.h"
-#include "core/quantile.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +14,6 @@ namespace {
 constexpr int kSectors = 8;
 constexpr int kBlock = 16;
 constexpr int kMinPairs = 12;
-constexpr int kMinEdges = 30;
 
 /// Mean luminance of every block of 16×16 pixels that is usable throughout; 0 of others.
 Image<double> blockMeans(const Image<Rgb>& radiance, const Image<std::uint8_t>& usable)
@@ -118,76 +116,6 @@ Vignetting estimateVignetting(const Image<Rgb>& radiance,
         square += (a - mean) * (a - mean);
     const auto n = static_cast<double>(answers.size());
     return {mean, std::sqrt(square / (n * (n - 1.0)))};
-}
-
-std::optional<DepthOfField> estimateFocus(const std::vector<EdgeProfile>& edges,
-                                          const Image<float>& depth_m,
-                                          double diameter_px)
-{
-    // With q = 1/depth and B = (diameter/4)²: spread² − B q² = (s² + B q0²) − 2 B q0 q, a line in
-    // q.
-    const double b = diameter_px * diameter_px / 16.0;
-    struct Point {
-        double q;
-        double y;
-        double sigma;
-    };
-    std::vector<Point> points;
-    for (const EdgeProfile& edge : edges) {
-        const int x = static_cast<int>(edge.at.x);
-        const int y = static_cast<int>(edge.at.y);
-        if (x < 0 || y < 0 || x >= depth_m.width() || y >= depth_m.height()) continue;
-        const double depth = depth_m(x, y);
-        if (!(depth > 0.0)) continue;
-        const double q = 1.0 / depth;
-        const double spread = edge.spread.g;
-        points.push_back(
-            {q, spread * spread - b * q * q, std::max(2.0 * spread * edge.spread_sigma.g, 1e-3)});
-    }
-    if (static_cast<int>(points.size()) < kMinEdges) return std::nullopt;
-    double level = 0.0;
-    double slope = 0.0;
-    double slope_sigma = 0.0;
-    double scale = 1.0;
-    for (int iteration = 0; iteration < 30; ++iteration) {
-        double sw = 0.0, sq = 0.0, sqq = 0.0, sy = 0.0, sqy = 0.0;
-        std::vector<double> size;
-        for (const Point& p : points) {
-            const double r = (p.y - level - slope * p.q) / p.sigma;
-            size.push_back(std::abs(r));
-            // The first round takes all; later ones leave out what is soft for another reason.
-            const double bend = 2.0 * scale;
-            const double robust =
-                iteration == 0
-                    ? 1.0
-                    : 1.0 / ((1.0 + r * r / (bend * bend)) * (1.0 + r * r / (bend * bend)));
-            const double w = robust / (p.sigma * p.sigma);
-            sw += w;
-            sq += w * p.q;
-            sqq += w * p.q * p.q;
-            sy += w * p.y;
-            sqy += w * p.q * p.y;
-        }
-        const double determinant = sw * sqq - sq * sq;
-        if (!(determinant > 1e-12 * sw * sqq)) return std::nullopt;
-        slope = (sw * sqy - sq * sy) / determinant;
-        level = (sy - slope * sq) / sw;
-        scale = std::max(1.4826 * quantile(size, 0.5), 1.0);
-        slope_sigma = scale * std::sqrt(sw / determinant);
-    }
-    const double q0 = -slope / (2.0 * b);
-    // Sharpness must follow depth: the focus is known only when the line's slope is.
-    if (!(q0 > 0.0) || !(std::abs(slope) > 3.0 * slope_sigma)) return std::nullopt;
-    // Without any depth of field the points lie on spread² = s²: then −B q² alone bends them, and a
-    // line of slope −2 B q̄ fits. The bend must be visible for the line to mean focus.
-    double low = points.front().q;
-    double high = low;
-    for (const Point& p : points) {
-        low = std::min(low, p.q);
-        high = std::max(high, p.q);
-    }
-    if (0.25 * diameter_px * std::max(high - q0, q0 - low) < 0.5) return std::nullopt;
-    return DepthOfField{diameter_px, 1.0 / q0};
 }
 
 }  // namespace insitu
