@@ -55,6 +55,52 @@ void checkFrame(const BracketFrame& frame, const BracketFrame& first)
                  frame.excluded.height());
 }
 
+/// The frame's picture in the middle of a larger one, its border repeated and excluded.
+void putIntoMiddle(BracketFrame& frame, int width, int height)
+{
+    const Image<glm::u16vec3> cut = std::move(frame.image.codes);
+    const int left = (width - cut.width()) / 2;
+    const int top = (height - cut.height()) / 2;
+    frame.image.codes = Image<glm::u16vec3>(width, height);
+    frame.excluded = Image<std::uint8_t>(width, height);
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const int from_x = std::clamp(x - left, 0, cut.width() - 1);
+            const int from_y = std::clamp(y - top, 0, cut.height() - 1);
+            frame.image.codes(x, y) = cut(from_x, from_y);
+            frame.excluded(x, y) = from_x + left == x && from_y + top == y ? 0 : 1;
+        }
+    }
+}
+
+/// Gives hand-cut pictures one size. False when they had it.
+bool makeEqualSized(std::vector<BracketFrame>& frames)
+{
+    constexpr double kLeastShare = 0.75;  // of the largest: less is hardly the same thing
+    int width = 0;
+    int height = 0;
+    for (const BracketFrame& frame : frames) {
+        width = std::max(width, frame.image.codes.width());
+        height = std::max(height, frame.image.codes.height());
+    }
+    bool changed = false;
+    for (BracketFrame& frame : frames) {
+        const Image<glm::u16vec3>& codes = frame.image.codes;
+        if (codes.empty() || (codes.width() == width && codes.height() == height)) continue;
+        if (codes.width() < kLeastShare * width || codes.height() < kLeastShare * height)
+            throw InputError(frame.name,
+                             fmt::format("{}x{} pixels, others up to {}x{}: too different to be "
+                                         "cut-outs of the same thing; cut all about equally large",
+                                         codes.width(),
+                                         codes.height(),
+                                         width,
+                                         height));
+        putIntoMiddle(frame, width, height);
+        changed = true;
+    }
+    return changed;
+}
+
 /// The same picture twice under one exposure counts once: its noise is no second measurement.
 void leaveOutRepeated(Bracket& bracket)
 {
@@ -179,7 +225,8 @@ Bracket makeBracket(std::vector<BracketFrame> frames, PhotoMetadata metadata)
 }
 
 Bracket readBracket(const std::vector<std::filesystem::path>& files,
-                    const std::vector<Exposure>& overrides)
+                    const std::vector<Exposure>& overrides,
+                    FrameSizes sizes)
 {
     INSITU_CHECK(overrides.empty() || overrides.size() == files.size(),
                  "{} exposures for {} files",
@@ -199,7 +246,15 @@ Bracket readBracket(const std::vector<std::filesystem::path>& files,
         checkColors(facts.back(), facts.front());
         frames.push_back(std::move(frame));
     }
+    const bool hand_cut = sizes == FrameSizes::HandCut && makeEqualSized(frames);
     Bracket bracket = makeBracket(std::move(frames));
+    bracket.hand_cut = hand_cut;
+    if (hand_cut)
+        bracket.findings.push_back(
+            {Severity::Info,
+             "bracket-hand-cut",
+             "the exposures differ in size: they are taken to be cut out of larger pictures and "
+             "are laid onto each other by what they show"});
     checkMetadata(facts, bracket.findings);
     // The longest speaks for all, in whatever order they were given.
     const auto longest = std::ranges::max_element(facts, {}, &FrameFacts::relative_exposure);

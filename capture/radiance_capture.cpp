@@ -131,7 +131,7 @@ CapturedRadiance captureRadiance(Bracket bracket,
     result.black_fraction = merge.black_fraction;
     for (const BracketFrame& frame : bracket.frames)
         result.frames.push_back(describe(frame, merge));
-    if (options.align && several) {
+    if ((options.align || bracket.hand_cut) && several) {
         Alignment alignment = alignBracket(bracket, options.alignment);
         if (!alignment.isIdentity()) bracket = applyAlignment(std::move(bracket), alignment);
         append(result.findings, std::move(alignment.findings));

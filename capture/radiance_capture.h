@@ -50,8 +50,8 @@ struct CapturedRadiance {
     Findings findings;  ///< of all steps, in order; those of `bracket` are not repeated
 };
 
-/// alignBracket → recoverResponse (unless `response` is given; corrects the frames' exposures) →
-/// findMovedPixels → mergeBracket → Rec. 709.
+/// alignBracket (if wanted, or hand-cut) → recoverResponse (unless `response` is given; corrects
+/// the frames' exposures) → findMovedPixels → mergeBracket → Rec. 709.
 ///
 /// All steps but the last work on the camera's own channels; radiance and variance then leave in
 /// Rec. 709 primaries, by the bracket's profile (metadata.color). Where no response can be

@@ -37,6 +37,12 @@ constexpr std::size_t kJudgedPixels = 4000;
 /// The numbers were chosen on the truth rooms and the three real brackets of response_peers.
 constexpr double kBetterBasis = 0.98;
 constexpr double kBetterWithoutPrior = 0.88;
+/// A curve that rises over so many codes, of those that matter, by less than this share of what the
+/// smooth one does has a plateau: codes there mean the same light.
+constexpr std::size_t kPlateauCodes = 12;
+constexpr double kPlateauShare = 0.125;
+constexpr std::size_t kFirstCode = 16;
+constexpr std::size_t kLastCode = 250;
 
 std::array<PixelGroups, 3> groupChannels(const std::array<std::vector<FrameTriple>, 3>& triples,
                                          const std::array<int, 3>& floor)
@@ -66,6 +72,20 @@ double medianStep(const std::vector<double>& log_exposures)
         steps.push_back((log_exposures[k] - log_exposures[k + 1]) / std::log(2.0));
     std::ranges::sort(steps);
     return steps[steps.size() / 2];
+}
+
+/// Whether light that is put back through the curve falls into steps. Prediction of codes does not
+/// mind: what a table without smoothness says of codes that few places show is noise.
+bool hasPlateau(const ResponseCurve& curve, const ResponseCurve& smooth)
+{
+    for (std::size_t c = 0; c < 3; ++c)
+        for (std::size_t z = kFirstCode; z + kPlateauCodes <= kLastCode; ++z) {
+            const auto rise = [&](const ResponseCurve& of) {
+                return std::log(of.exposure[c][z + kPlateauCodes] / of.exposure[c][z]);
+            };
+            if (rise(curve) < kPlateauShare * rise(smooth)) return true;
+        }
+    return false;
 }
 
 }  // namespace
@@ -203,6 +223,7 @@ Candidate chooseMethod(const Bracket& places,
                        Findings& findings)
 {
     std::optional<Candidate> best;
+    std::optional<ResponseCurve> smooth;
     std::string errors;
     for (const ResponseMethod method : {ResponseMethod::Debevec,
                                         ResponseMethod::Basis,
@@ -217,6 +238,11 @@ Candidate chooseMethod(const Bracket& places,
         }
         candidate->error = judge(places, candidate->curve, scale, 0);
         errors += fmt::format(" {:.3f}", candidate->error);
+        if (!smooth) smooth = candidate->curve;  // the first has a prior of smoothness
+        if (hasPlateau(candidate->curve, *smooth)) {
+            errors += " (but has plateaus)";
+            continue;
+        }
         const double factor = method == ResponseMethod::Basis ? kBetterBasis : kBetterWithoutPrior;
         if (!best || (candidate->error >= 0.0 && candidate->error < factor * best->error))
             best = std::move(candidate);

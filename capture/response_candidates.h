@@ -48,7 +48,8 @@ struct Candidate {
 /// Nothing when the method finds no increasing curve.
 [[nodiscard]] std::optional<Candidate> tryMethod(const Evidence& evidence, ResponseMethod method);
 
-/// The best of all methods by held-out prediction, and the finding that says so.
+/// The best of all methods by held-out prediction whose curve has no plateaus, and the finding that
+/// says so.
 [[nodiscard]] Candidate chooseMethod(const Bracket& places,
                                      const Evidence& evidence,
                                      const std::vector<double>& scale,

@@ -75,7 +75,8 @@ double steepness(const LogCurve& curve,
     return others > 0.0 && own > 0.0 ? std::clamp(own / others, 0.5, 2.0) : 1.0;
 }
 
-/// Continues one curve step by step away from its reach.
+/// Continues one curve step by step away from its reach; where no channel reaches, all go on alike,
+/// so that greys stay grey.
 void continueCurve(LogCurve& curve,
                    const std::array<LogCurve, 3>& curves,
                    const std::array<CodeReach, 3>& reaches,
@@ -85,22 +86,21 @@ void continueCurve(LogCurve& curve,
     const auto bottom = static_cast<std::size_t>(std::clamp(own.low, 1.0, 253.0));
     if (top <= bottom) return;
     const LogCurve measured = curve;
+    // Of every channel that is measured anywhere, for steps that none of them is measured at.
+    std::array<CodeReach, 3> anywhere = reaches;
+    for (CodeReach& reach : anywhere)
+        if (reach.low <= reach.high) reach = {0.0, 255.0};
+    const auto riseOf = [&](std::size_t z, std::size_t from, std::size_t to, std::size_t beyond) {
+        if (const auto others = meanRise(curves, reaches, z, z + 1))
+            return *others * steepness(measured, curves, reaches, from, to, beyond);
+        return *meanRise(curves, anywhere, z, z + 1);
+    };
     const std::size_t inner = std::max(bottom, top - std::min(top, kJunction));
-    for (std::size_t z = top; z + 1 < curve.size(); ++z) {
-        const std::optional<double> others = meanRise(curves, reaches, z, z + 1);
-        const double rise = others
-                                ? *others * steepness(measured, curves, reaches, inner, top, z + 1)
-                                : measured[z + 1] - measured[z];
-        curve[z + 1] = curve[z] + rise;
-    }
+    for (std::size_t z = top; z + 1 < curve.size(); ++z)
+        curve[z + 1] = curve[z] + riseOf(z, inner, top, z + 1);
     const std::size_t outer = std::min(top, bottom + kJunction / 4);
-    for (std::size_t z = bottom; z > 0; --z) {
-        const std::optional<double> others = meanRise(curves, reaches, z - 1, z);
-        const double rise =
-            others ? *others * steepness(measured, curves, reaches, bottom, outer, z - 1)
-                   : measured[z] - measured[z - 1];
-        curve[z - 1] = curve[z] - rise;
-    }
+    for (std::size_t z = bottom; z > 0; --z)
+        curve[z - 1] = curve[z] - riseOf(z - 1, bottom, outer, z - 1);
 }
 
 std::string describe(const Bracket& bracket, std::size_t frame, double log_scale)

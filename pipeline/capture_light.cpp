@@ -5,6 +5,7 @@
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "pipeline/insert.h"
+#include "pipeline/probe_outline.h"
 #include "pipeline/reference_capture.h"
 
 #include <algorithm>
@@ -44,6 +45,7 @@ struct ProbePicture {
 /// Brackets of encoded photographs need a response; a single radiance file is linear already.
 /// The first view's response, once known, is the others'.
 ProbePicture probePicture(const std::vector<ProjectImage>& images,
+                          FrameSizes sizes,
                           const std::optional<ResponseCurve>& response,
                           const CaptureOptions& options,
                           CapturedLight& light)
@@ -58,7 +60,7 @@ ProbePicture probePicture(const std::vector<ProjectImage>& images,
         files.push_back(image.path);
         exposures.push_back(image.exposure);
     }
-    Bracket bracket = readBracket(files, exposures);
+    Bracket bracket = readBracket(files, exposures, sizes);
     append(light.findings, std::exchange(bracket.findings, {}));
     light.metadata = bracket.metadata;
     light.radiance_unit_known = true;
@@ -69,6 +71,17 @@ ProbePicture probePicture(const std::vector<ProjectImage>& images,
     MergeResult& merged = captured.merged;
     Image<Rgb> clipped = clippedPart(merged);
     return {std::move(merged.radiance.pixels), std::move(clipped)};
+}
+
+/// The ball as the project gives it, or as its picture shows it.
+MirrorBall ballOf(const ProjectView& view, const Image<Rgb>& radiance, Findings& findings)
+{
+    MirrorBall ball = view.ball;
+    if (view.find_outline && !findProbeOutline(radiance, view.crop_origin_px, ball, findings))
+        throw NoAnswerError(view.images.front().path.string(),
+                            "the outline of the mirror ball was not found in these pictures; give "
+                            "the ball's center_px and radius_px");
+    return ball;
 }
 
 /// A picture of the whole sphere, and its clipped part mapped in the same way.
@@ -85,11 +98,14 @@ LightProbe mapSphere(ProbeKind kind, const ProbePicture& picture, int width)
     return probe;
 }
 
-Camera cameraOf(const ProjectView& view, const Camera* photo_camera, const Image<Rgb>& radiance)
+Camera cameraOf(const ProjectView& view,
+                const MirrorBall& ball,
+                const Camera* photo_camera,
+                const Image<Rgb>& radiance)
 {
     if (view.view_position_m)
         return ballCamera(
-            view.ball, *view.view_position_m, radiance.width(), radiance.height(), view.view_up);
+            ball, *view.view_position_m, radiance.width(), radiance.height(), view.view_up);
     INSITU_CHECK(photo_camera != nullptr, "a view of the photograph's camera, which is not given");
     return *photo_camera;
 }
@@ -97,6 +113,7 @@ Camera cameraOf(const ProjectView& view, const Camera* photo_camera, const Image
 /// Cards and balls in the probe's pictures, or in pictures of their own; numbers as given.
 void captureReferences(const ProjectProbe& probe,
                        const ProbePicture& first_view,
+                       const MirrorBall& first_ball,
                        const Camera* photo_camera,
                        const std::optional<ResponseCurve>& response,
                        const CaptureOptions& options,
@@ -111,7 +128,7 @@ void captureReferences(const ProjectProbe& probe,
         ReferenceGroup group;
         if (reference.source == ProjectReference::Source::Probe) {
             const ProjectView& view = probe.views[0];
-            if (ball) camera = cameraOf(view, photo_camera, first_view.radiance);
+            if (ball) camera = cameraOf(view, first_ball, photo_camera, first_view.radiance);
             group = measureReference(reference,
                                      {first_view.radiance,
                                       first_view.clipped,
@@ -122,7 +139,8 @@ void captureReferences(const ProjectProbe& probe,
                                      light.findings);
         } else {
             CapturedLight own;
-            const ProbePicture picture = probePicture(reference.images, response, options, own);
+            const ProbePicture picture =
+                probePicture(reference.images, FrameSizes::Equal, response, options, own);
             append(light.findings, std::move(own.findings));
             if (ball) {
                 MirrorBall outline;
@@ -165,9 +183,12 @@ CapturedLight captureProbe(
     std::optional<ResponseCurve> response;
     if (probe.response) response = readResponse(*probe.response);
     std::vector<ProbePicture> pictures;
+    std::vector<MirrorBall> balls;
     for (const ProjectView& view : probe.views) {
         const bool known = light.response_known;
-        pictures.push_back(probePicture(view.images, response, options, light));
+        const FrameSizes sizes = view.find_outline ? FrameSizes::HandCut : FrameSizes::Equal;
+        pictures.push_back(probePicture(view.images, sizes, response, options, light));
+        balls.push_back(ballOf(view, pictures.back().radiance, light.findings));
         light.response_known = light.response_known || known;
         if (!response && light.response_known) response = light.response;
     }
@@ -182,22 +203,23 @@ CapturedLight captureProbe(
         unwrap.crop_origin_px = probe.views[0].crop_origin_px;
         if (!pictures[0].clipped.empty()) unwrap.clipped = &pictures[0].clipped;
         unwrap.distance_to_room = distance_to_room;
-        made = unwrapMirrorBall(pictures[0].radiance,
-                                probe.views[0].ball,
-                                cameraOf(probe.views[0], photo_camera, pictures[0].radiance),
-                                unwrap);
+        made =
+            unwrapMirrorBall(pictures[0].radiance,
+                             balls[0],
+                             cameraOf(probe.views[0], balls[0], photo_camera, pictures[0].radiance),
+                             unwrap);
     } else {
         std::vector<ProbeView> views;
         for (std::size_t i = 0; i < pictures.size(); ++i) {
             const ProjectView& from = probe.views[i];
             ProbeView view;
-            view.camera = cameraOf(from, photo_camera, pictures[i].radiance);
+            view.ball = balls[i];
+            view.camera = cameraOf(from, view.ball, photo_camera, pictures[i].radiance);
             if (from.mask)
                 view.mask = readProbeMask(
                     *from.mask, pictures[i].radiance.width(), pictures[i].radiance.height());
             view.radiance = std::move(pictures[i].radiance);
             view.clipped = std::move(pictures[i].clipped);
-            view.ball = from.ball;
             view.crop_origin_px = from.crop_origin_px;
             views.push_back(std::move(view));
         }
@@ -208,7 +230,7 @@ CapturedLight captureProbe(
     }
     append(light.findings, std::move(made.findings));
     light.environment = std::move(made.environment);
-    captureReferences(probe, first, photo_camera, response, options, light);
+    captureReferences(probe, first, balls[0], photo_camera, response, options, light);
     return light;
 }
 

@@ -82,6 +82,7 @@ CapturedLight cachedLight(const Project& project,
     bool by_photo = false;
     for (const ProjectView& view : probe.views) {
         key.add(view.ball, view.view_position_m, view.view_up, view.crop_origin_px);
+        key.add(view.find_outline);
         key.add(view.images.size(), view.mask.has_value());
         for (const ProjectImage& image : view.images)
             key.add(image.path.filename().string(), image.exposure).addFile(image.path);

@@ -141,7 +141,7 @@ Findings placeProbeFromOutline(const CameraEstimate& camera, Project& project)
     ProjectProbe& probe = *project.light.probe;
     BallOutline outline;
     const auto view = std::ranges::find_if(
-        probe.views, [](const ProjectView& v) { return !v.view_position_m.has_value(); });
+        probe.views, [](const ProjectView& v) { return !v.view_position_m && !v.find_outline; });
     INSITU_CHECK(
         view != probe.views.end(), "{}", "the ball is not seen by the photograph's camera");
     outline.center_px = view->ball.center_px;

@@ -41,6 +41,8 @@ enum class ProbeKind { MirrorBall, Angular, LatLong, CubeCross };
 struct ProjectView {
     std::vector<ProjectImage> images;
     MirrorBall ball;  ///< mirror ball only; center_m is the probe's
+    /// The file does not give the outline: captureProbe looks for it (pipeline/probe_outline.h).
+    bool find_outline = false;
     /// Mirror ball only: its camera's place, or nothing when it is the photograph's camera.
     std::optional<glm::dvec3> view_position_m;
     glm::dvec3 view_up{0.0, 1.0, 0.0};  ///< upwards in the picture; for a place only

@@ -55,8 +55,11 @@ namespace {
 void readBall(const JsonNode& node, ProjectView& view)
 {
     node.expectKeys(keys::kBall);
-    view.ball.center_px = node.at("center_px").vec2();
-    view.ball.radius_px = node.at("radius_px").positive();
+    view.find_outline = !node.has("center_px") && !node.has("radius_px");
+    if (!view.find_outline) {
+        view.ball.center_px = node.at("center_px").vec2();
+        view.ball.radius_px = node.at("radius_px").positive();
+    }
     view.ball.radius_m = node.at("radius_m").positive();
     if (const auto value = node.find("reflectance")) {
         view.ball.reflectance = value->positive();
@@ -157,6 +160,10 @@ ProjectProbe readProbe(const JsonNode& node, const std::filesystem::path& folder
     };
     if (probe.center_from_outline && std::ranges::none_of(probe.views, by_photo))
         center.fail("\"from-outline\" needs a mirror ball with \"view\": \"photo\"");
+    if (probe.center_from_outline && std::ranges::none_of(probe.views, [&](const ProjectView& v) {
+            return by_photo(v) && !v.find_outline;
+        }))
+        center.fail("\"from-outline\" needs the outline: give the ball's center_px and radius_px");
     if (const auto response = node.find("response"))
         probe.response = existingFile(*response, folder);
     if (const auto references = node.find("references"))

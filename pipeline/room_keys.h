@@ -42,8 +42,12 @@ inline const KeyList kFurniture = {"model",
                                    "name",
                                    "in_project"};
 inline const KeyList kSimulatedCamera = {"position_m", "target_m", "focal_px", "width", "height"};
-inline const KeyList kSimulatedBall = {
-    "center_m", "radius_m", "reflectance", "view_position_m", "size_px"};
+inline const KeyList kSimulatedBall = {"center_m",
+                                       "radius_m",
+                                       "reflectance",
+                                       "view_position_m",
+                                       "further_view_positions_m",
+                                       "size_px"};
 inline const KeyList kPhotography = {"plate_seconds",
                                      "ball_seconds",
                                      "plate_percentile",

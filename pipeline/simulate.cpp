@@ -142,11 +142,17 @@ SimulatedShot takeShot(const SimulatedRoom& room,
             simulatedExif(room.body, seconds, focal_px, radiance.width())};
 }
 
-/// "ball_1_32.jpg" for 1/32 s, "ball_2.jpg" for 2 s.
-std::string ballName(double seconds)
+/// "ball_1_32.jpg" for 1/32 s, "ball_2.jpg" for 2 s; "ball2_1_32.jpg" in the second view.
+std::string ballName(std::size_t view, double seconds)
 {
-    if (seconds >= 1.0) return fmt::format("ball_{:g}.jpg", seconds);
-    return fmt::format("ball_1_{:g}.jpg", std::round(1.0 / seconds * 1000.0) / 1000.0);
+    const std::string ball = view == 0 ? "ball" : fmt::format("ball{}", view + 1);
+    if (seconds >= 1.0) return fmt::format("{}_{:g}.jpg", ball, seconds);
+    return fmt::format("{}_1_{:g}.jpg", ball, std::round(1.0 / seconds * 1000.0) / 1000.0);
+}
+
+Camera ballViewCamera(const SimulatedRoom& room, std::size_t view)
+{
+    return ballCamera(room.ball, room.ball_views_m[view], room.ball_size_px, room.ball_size_px);
 }
 
 }  // namespace
@@ -169,17 +175,21 @@ SimulatedTruth renderRoom(const SimulatedRoom& room,
         finish(renderScene(scene.with, scene.light, room.camera, options, with), scene.with, room);
     truth.coverage = renderCoverage(room, scene);
 
-    const Camera camera =
-        ballCamera(room.ball, room.ball_view_m, room.ball_size_px, room.ball_size_px);
-    PartOfProgress ball(progress, 0.8, 0.93);
-    truth.ball = renderRays(
-        scene,
-        glm::ivec2(room.ball_size_px),
-        [&](glm::dvec2 pixel) { return ballRay(room, camera, pixel); },
-        room.ball_samples_per_pixel,
-        room,
-        ball,
-        "ball");
+    const auto views = static_cast<double>(room.ball_views_m.size());
+    for (std::size_t view = 0; view < room.ball_views_m.size(); ++view) {
+        const Camera camera = ballViewCamera(room, view);
+        const double done = static_cast<double>(view) / views;
+        PartOfProgress ball(
+            progress, std::lerp(0.8, 0.93, done), std::lerp(0.8, 0.93, done + 1.0 / views));
+        truth.balls.push_back(renderRays(
+            scene,
+            glm::ivec2(room.ball_size_px),
+            [&](glm::dvec2 pixel) { return ballRay(room, camera, pixel); },
+            room.ball_samples_per_pixel,
+            room,
+            ball,
+            "ball"));
+    }
 
     PartOfProgress panorama(progress, 0.93, 1.0);
     const glm::dvec2 size{room.panorama_width, room.panorama_width / 2};
@@ -225,16 +235,19 @@ SimulatedCapture simulate(const SimulatedRoom& room, Progress& progress)
         takeShot(room, capture, capture.truth.plate, "plate.jpg", room.plate_seconds, focal, 1);
     capture.with =
         takeShot(room, capture, capture.truth.with, "truth.jpg", room.plate_seconds, focal, 2);
-    const double ball_focal =
-        ballCamera(room.ball, room.ball_view_m, room.ball_size_px, room.ball_size_px).focal_px.x;
-    for (std::size_t i = 0; i < room.ball_seconds.size(); ++i)
-        capture.bracket.push_back(takeShot(room,
-                                           capture,
-                                           capture.truth.ball,
-                                           ballName(room.ball_seconds[i]),
-                                           room.ball_seconds[i],
-                                           ball_focal,
-                                           3 + i));
+    std::uint64_t shot = 3;
+    for (std::size_t view = 0; view < room.ball_views_m.size(); ++view) {
+        const double ball_focal = ballViewCamera(room, view).focal_px.x;
+        std::vector<SimulatedShot>& bracket = capture.brackets.emplace_back();
+        for (const double seconds : room.ball_seconds)
+            bracket.push_back(takeShot(room,
+                                       capture,
+                                       capture.truth.balls[view],
+                                       ballName(view, seconds),
+                                       seconds,
+                                       ball_focal,
+                                       shot++));
+    }
     return capture;
 }
 

@@ -13,11 +13,11 @@ namespace insitu {
 
 /// What the renderer made of a simulated room: scene-linear, before the camera.
 struct SimulatedTruth {
-    Image<Rgb> plate;       ///< the empty place
-    Image<Rgb> with;        ///< with the object really in it
-    Image<float> coverage;  ///< share of the pixel that the object covers
-    Image<Rgb> ball;        ///< the close-up of the mirror ball
-    Image<Rgb> panorama;    ///< from the ball's centre, mapping of core/environment_map.h
+    Image<Rgb> plate;               ///< the empty place
+    Image<Rgb> with;                ///< with the object really in it
+    Image<float> coverage;          ///< share of the pixel that the object covers
+    std::vector<Image<Rgb>> balls;  ///< the close-ups of the mirror ball, one a view
+    Image<Rgb> panorama;            ///< from the ball's centre, mapping of core/environment_map.h
 };
 
 /// Path-traces all of it. The ball is not part of the room's light: it sees the empty place, and
@@ -39,7 +39,7 @@ struct SimulatedCapture {
     SimulatedTruth truth;
     double sensor_scale = 1.0;
     SimulatedShot plate, with;
-    std::vector<SimulatedShot> bracket;
+    std::vector<std::vector<SimulatedShot>> brackets;  ///< one a view of the ball
     std::vector<LineSegment> edges;
     LineSet lines;
     std::vector<SolidBounds> solids;
@@ -47,9 +47,9 @@ struct SimulatedCapture {
 };
 [[nodiscard]] SimulatedCapture simulate(const SimulatedRoom& room, Progress& progress);
 
-/// Writes into `folder` what a user would have: plate.jpg, ball_*.jpg, lines.json, project.json
-/// (which names the object's model where it is); and into `folder`/truth what a judge needs
-/// (docs/file_format.md). Overwrites.
+/// Writes into `folder` what a user would have: plate.jpg, ball_*.jpg (further views: ball2_*.jpg
+/// and so on), lines.json, project.json (which names the object's model where it is); and into
+/// `folder`/truth what a judge needs (docs/file_format.md). Overwrites.
 void writeCapture(const SimulatedCapture& capture,
                   const SimulatedRoom& room,
                   const std::filesystem::path& folder);

@@ -93,18 +93,24 @@ Json projectJson(const SimulatedCapture& capture,
                  const SimulatedRoom& room,
                  const std::filesystem::path& folder)
 {
-    Json images = Json::array();
-    for (const SimulatedShot& shot : capture.bracket)
-        images.push_back(shot.name);
-    const Json probe = {{"kind", "mirror-ball"},
-                        {"images", images},
-                        {"ball",
-                         {{"center_px", list(room.ball.center_px)},
-                          {"radius_px", room.ball.radius_px},
-                          {"radius_m", room.ball.radius_m},
-                          {"reflectance", room.ball.reflectance}}},
-                        {"center_m", list(room.ball.center_m)},
-                        {"view", {{"position_m", list(room.ball_view_m)}}}};
+    Json views = Json::array();
+    for (std::size_t view = 0; view < capture.brackets.size(); ++view) {
+        Json images = Json::array();
+        for (const SimulatedShot& shot : capture.brackets[view])
+            images.push_back(shot.name);
+        views.push_back({{"images", images},
+                         {"ball",
+                          {{"center_px", list(room.ball.center_px)},
+                           {"radius_px", room.ball.radius_px},
+                           {"radius_m", room.ball.radius_m},
+                           {"reflectance", room.ball.reflectance}}},
+                         {"view", {{"position_m", list(room.ball_views_m[view])}}}});
+    }
+    Json probe = {{"kind", "mirror-ball"}, {"center_m", list(room.ball.center_m)}};
+    if (views.size() == 1)
+        probe.update(views[0]);
+    else
+        probe["views"] = views;
     return {{"format", "insitu-project"},
             {"version", 1},
             {"photo", {{"image", capture.plate.name}}},
@@ -141,8 +147,11 @@ Json truthJson(const SimulatedCapture& capture,
 {
     const Camera& camera = room.camera;
     Json seconds = Json::array();
-    for (const SimulatedShot& shot : capture.bracket)
+    for (const SimulatedShot& shot : capture.brackets[0])
         seconds.push_back(shot.seconds);
+    Json views = Json::array();
+    for (const glm::dvec3 view : room.ball_views_m)
+        views.push_back(list(view));
     return {
         {"image", {{"width", camera.width}, {"height", camera.height}}},
         {"camera",
@@ -158,7 +167,8 @@ Json truthJson(const SimulatedCapture& capture,
          {{"center_in_world_m", list(room.ball.center_m)},
           {"radius_m", room.ball.radius_m},
           {"reflectance", room.ball.reflectance},
-          {"camera_position_in_world_m", list(room.ball_view_m)}}},
+          {"camera_position_in_world_m", views[0]},
+          {"camera_positions_in_world_m", views}}},
         {"object", objectJson(room.object, folder / "truth")},
         {"true_edges", segmentsJson(capture.edges, false)},
         {"true_origin_px", list(*camera.project(glm::dvec3(0.0)))},
@@ -222,8 +232,9 @@ void writeCapture(const SimulatedCapture& capture,
         writeEncoded(where / shot.name, shot.image, shot.exif, room.body.jpeg_quality);
     };
     writeShot(out, capture.plate);
-    for (const SimulatedShot& shot : capture.bracket)
-        writeShot(out, shot);
+    for (const std::vector<SimulatedShot>& bracket : capture.brackets)
+        for (const SimulatedShot& shot : bracket)
+            writeShot(out, shot);
     writeJson(out / "lines.json", linesJson(capture.lines));
     writeJson(out / "project.json", projectJson(capture, room, out));
 

@@ -227,10 +227,20 @@ void readSimulatedBall(const JsonNode& node, SimulatedRoom& room)
     }
     if (!inside(room.box, ball.center_m)) node.at("center_m").fail("lies outside the room");
     const JsonNode view = node.at("view_position_m");
-    room.ball_view_m = view.vec3();
-    if (!inside(room.box, room.ball_view_m)) view.fail("lies outside the room");
-    if (glm::distance(room.ball_view_m, ball.center_m) < 2.0 * ball.radius_m)
-        view.fail("is too near the ball: keep at least two radii away");
+    const auto addView = [&](const JsonNode& position) {
+        const glm::dvec3 place = position.vec3();
+        if (!inside(room.box, place)) position.fail("lies outside the room");
+        if (glm::distance(place, ball.center_m) < 2.0 * ball.radius_m)
+            position.fail("is too near the ball: keep at least two radii away");
+        if (glm::length(glm::dvec2(place.x, place.z) -
+                        glm::dvec2(ball.center_m.x, ball.center_m.z)) < ball.radius_m)
+            position.fail("looks straight up or down at the ball: move it aside");
+        room.ball_views_m.push_back(place);
+    };
+    addView(view);
+    if (const auto more = node.find("further_view_positions_m"))
+        for (std::size_t i = 0; i < more->size(); ++i)
+            addView(more->at(i));
     if (const auto v = node.find("size_px")) room.ball_size_px = readCount(*v, kMinSide, kMaxSide);
     // The ball fills 1/1.15 of the frame, centred.
     ball.center_px = glm::dvec2(0.5 * room.ball_size_px);

@@ -99,7 +99,7 @@ struct SimulatedRoom {
     ProjectObject object;
     MirrorBall ball;  ///< center_px and radius_px for the square close-up
     int ball_size_px = 600;
-    glm::dvec3 ball_view_m{0.0};
+    std::vector<glm::dvec3> ball_views_m;  ///< where the close-ups' camera was; one or more
 
     SimulatedCameraBody body;
     double plate_seconds = 1.0 / 30.0;

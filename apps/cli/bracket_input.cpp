@@ -113,9 +113,11 @@ void addBracketOptions(CLI::App& command, BracketArguments& arguments)
         ->capture_default_str();
 }
 
-CapturedRadiance mergeArguments(const BracketArguments& arguments, Context& context)
+CapturedRadiance mergeArguments(const BracketArguments& arguments,
+                                Context& context,
+                                FrameSizes sizes)
 {
-    Bracket bracket = readBracket(arguments.images, exposuresFromText(arguments));
+    Bracket bracket = readBracket(arguments.images, exposuresFromText(arguments), sizes);
     context.print(bracket.findings);
     std::optional<ResponseCurve> response;
     if (!arguments.response.empty()) {

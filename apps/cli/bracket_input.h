@@ -22,7 +22,9 @@ struct BracketArguments {
 void addBracketOptions(CLI::App& command, BracketArguments& arguments);
 
 /// Reads the bracket and the response, if one is given, and merges; prints the findings.
-[[nodiscard]] CapturedRadiance mergeArguments(const BracketArguments& arguments, Context& context);
+[[nodiscard]] CapturedRadiance mergeArguments(const BracketArguments& arguments,
+                                              Context& context,
+                                              FrameSizes sizes = FrameSizes::Equal);
 
 /// "1/60" or "0.5" -> seconds; InputError when it is neither or not positive.
 [[nodiscard]] double secondsFromText(const std::string& text);

@@ -1,12 +1,12 @@
 #include "apps/cli/bracket_input.h"
 #include "apps/cli/command.h"
 #include "apps/cli/reference_input.h"
-#include "capture/ball_outline.h"
 #include "capture/clipped_source.h"
 #include "capture/light_probe.h"
 #include "capture/probe_views.h"
 #include "core/io/image_io.h"
 #include "pipeline/insert.h"
+#include "pipeline/probe_outline.h"
 #include "pipeline/reference_capture.h"
 
 #include <algorithm>
@@ -50,7 +50,11 @@ ProbePicture readProbePicture(const ProbeArguments& arguments, Context& context)
     const auto& images = arguments.bracket.images;
     if (images.size() == 1 && isRadianceFile(images.front()))
         return {readRadiance(images.front()).pixels, {}};
-    const CapturedRadiance captured = mergeArguments(arguments.bracket, context);
+    // Cut-outs may differ in size where nobody says where in them the ball is.
+    const bool may_differ =
+        arguments.kind == "mirror-ball" && !arguments.center_px && !arguments.radius_px;
+    const CapturedRadiance captured = mergeArguments(
+        arguments.bracket, context, may_differ ? FrameSizes::HandCut : FrameSizes::Equal);
     return {captured.merged.radiance.pixels, clippedPart(captured.merged)};
 }
 
@@ -91,35 +95,12 @@ void placeOutline(const Image<Rgb>& radiance,
 {
     ball.center_px = 0.5 * glm::dvec2(radiance.width(), radiance.height());
     ball.radius_px = 0.5 * std::min(radiance.width(), radiance.height());
-    if (!arguments.center_px || !arguments.radius_px) {
-        // A circle this uncertain is no better than the usual crop, which the ball fills.
-        constexpr double kUselessSigma = 0.05;  // share of the radius
-        BallOutlineResult found = findBallOutline(radiance);
-        if (found.outline && std::max(found.outline->center_sigma, found.outline->radius_sigma) >
-                                 kUselessSigma * found.outline->radius_px)
-            found.outline.reset();
-        if (found.outline) findings = found.findings;  // a doubtful one says so
-        if (found.outline) {
-            ball.center_px = found.outline->center_px;
-            ball.radius_px = found.outline->radius_px;
-        }
-        const std::string outline = fmt::format(
-            "centre ({:.1f}, {:.1f}), radius {:.1f} px; "
-            "--center and --radius give another",
-            ball.center_px.x,
-            ball.center_px.y,
-            ball.radius_px);
-        if (found.outline)
-            findings.push_back({Severity::Info,
-                                "probe-outline-found",
-                                "the ball's outline was found: " + outline});
-        else
-            findings.push_back({Severity::Warning,
-                                "probe-outline-assumed",
-                                "the ball's outline was not found and is taken to fill the "
-                                "picture: " +
-                                    outline});
-    }
+    const bool given = arguments.center_px && arguments.radius_px;
+    if (!given && !findProbeOutline(radiance, {}, ball, findings))
+        findings.push_back({Severity::Warning,
+                            "probe-outline-assumed",
+                            "the ball's outline was not found and is taken to fill the picture: " +
+                                outlineText(ball) + "; give --center and --radius"});
     if (arguments.center_px)
         ball.center_px = {(*arguments.center_px)[0], (*arguments.center_px)[1]};
     if (arguments.radius_px) ball.radius_px = *arguments.radius_px;

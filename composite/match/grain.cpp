@@ -17,6 +17,10 @@ constexpr double kLevelStep = 256.0 / GrainModel::kLevels;
 constexpr std::size_t kMinFlatBlocks = 40;
 /// Variance against the law's beyond which a block counts as textured whatever the crowd says.
 constexpr double kMaxExcess = 3.0;
+/// Levels that no flat block shows get at most this times the largest variance of one that does:
+/// the law follows the response, and where the bracket does not show that it may be as good as
+/// flat.
+constexpr double kMostUnseen = 4.0;
 /// Blocks that weigh as much as the sensor's law in the correction of one level.
 constexpr double kLawWeight = 20.0;
 
@@ -196,11 +200,12 @@ std::vector<std::uint8_t> separateTexture(const std::vector<GrainBlock>& blocks,
     return flat;
 }
 
-/// What the law misses, by level: mean of measured over expected among the flat blocks.
-std::array<double, GrainModel::kLevels> correctionByLevel(const std::vector<GrainBlock>& blocks,
-                                                          const std::vector<std::uint8_t>& flat,
-                                                          const SensorLaw& law,
-                                                          int channel)
+/// Variance by level: the law's, corrected by the mean of measured over expected among the flat
+/// blocks.
+std::array<double, GrainModel::kLevels> varianceByLevel(const std::vector<GrainBlock>& blocks,
+                                                        const std::vector<std::uint8_t>& flat,
+                                                        const SensorLaw& law,
+                                                        int channel)
 {
     std::array<double, GrainModel::kLevels> sum{};
     std::array<double, GrainModel::kLevels> count{};
@@ -212,10 +217,16 @@ std::array<double, GrainModel::kLevels> correctionByLevel(const std::vector<Grai
         sum[k] += blocks[i].variance[channel] / std::max(law.variance(level), 1e-3);
         count[k] += 1.0;
     }
-    std::array<double, GrainModel::kLevels> correction{};
-    for (std::size_t k = 0; k < correction.size(); ++k)
-        correction[k] = (sum[k] + kLawWeight) / (count[k] + kLawWeight);
-    return correction;
+    std::array<double, GrainModel::kLevels> variance{};
+    double largest = 0.0;
+    for (std::size_t k = 0; k < variance.size(); ++k) {
+        variance[k] = law.variance(levelMiddle(static_cast<int>(k))) * (sum[k] + kLawWeight) /
+                      (count[k] + kLawWeight);
+        if (count[k] > 0.0) largest = std::max(largest, variance[k]);
+    }
+    for (std::size_t k = 0; k < variance.size(); ++k)
+        if (count[k] == 0.0) variance[k] = std::min(variance[k], kMostUnseen * largest);
+    return variance;
 }
 
 }  // namespace
@@ -260,11 +271,10 @@ GrainEstimate estimateGrain(const EncodedImage& photo, const ResponseCurve& resp
     std::array<std::array<double, GrainModel::kLevels>, 3> total{};
     const double rounding = kRoundingVariance * (255.0 / photo.max_code) * (255.0 / photo.max_code);
     for (std::size_t c = 0; c < 3; ++c) {
-        const auto correction = correctionByLevel(blocks, flat, laws[c], static_cast<int>(c));
+        const auto variances = varianceByLevel(blocks, flat, laws[c], static_cast<int>(c));
         for (int k = 0; k < GrainModel::kLevels; ++k) {
             const auto i = static_cast<std::size_t>(k);
-            const double variance =
-                std::max(laws[c].variance(levelMiddle(k)) * correction[i], rounding);
+            const double variance = std::max(variances[i], rounding);
             total[c][i] = std::sqrt(variance);
             estimate.model.sigma[c][i] = std::sqrt(variance - rounding);
         }

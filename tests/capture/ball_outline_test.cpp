@@ -1,12 +1,8 @@
-#include "capture/ball_outline.h"
-
 #include "core/check.h"
-#include "core/io/image_io.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "tests/capture/expect_outline.h"
 #include "tests/capture/synthetic_ball.h"
-#include "tests/support/data.h"
-#include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
 
@@ -52,14 +48,6 @@ void addNoise(Image<Rgb>& image, double share)
             value = std::max(value * (1.0f + static_cast<float>(share * random.normal())), 0.0f);
         }
     }
-}
-
-void expectOutline(const BallOutlineResult& result, const MirrorBall& truth, double within)
-{
-    ASSERT_TRUE(result.outline);
-    EXPECT_NEAR(result.outline->center_px.x, truth.center_px.x, within);
-    EXPECT_NEAR(result.outline->center_px.y, truth.center_px.y, within);
-    EXPECT_NEAR(result.outline->radius_px, truth.radius_px, within);
 }
 
 struct Place {
@@ -268,36 +256,6 @@ TEST(FindBallOutline, RefusesUnusableOptions)
         options.start->center_px.x = std::numeric_limits<double>::infinity();
     });
     EXPECT_TRUE(BallOutlineOptions{}.validate().empty());
-}
-
-// The circle was measured by hand there; the truth room's is exact.
-TEST(FindBallOutline, InRealAndRenderedPhotographs)
-{
-    INSITU_NEEDS_DATA();
-    const std::filesystem::path living = dataFolder() / "brackets" / "ball_olapietka_livingroom";
-    const BallOutlineResult small = findBallOutline(
-        readBracket({living / "raw1.jpg", living / "raw2.jpg", living / "raw3.jpg"}));
-    MirrorBall ball;
-    ball.center_px = {754.0, 549.0};
-    ball.radius_px = 72.0;
-    expectOutline(small, ball, 3.0);  // as good as the hand that measured
-
-    // Noise, JPEG, and walls behind that the rim hardly differs from; in room c the edge of a
-    // sunlit floor runs along the rim, 5 pixels inside it.
-    for (const char* name : {"truth-room-a", "truth-room-b", "truth-room-c"}) {
-        SCOPED_TRACE(name);
-        const std::filesystem::path room = dataFolder() / name;
-        const BallOutlineResult exact = findBallOutline(
-            readBracket({room / "ball_1_8.jpg", room / "ball_1_32.jpg", room / "ball_1_128.jpg"}));
-        ball.center_px = {300.0, 300.0};
-        ball.radius_px = 260.8;
-        expectOutline(exact, ball, 1.3);  // room c: 1.0, with a standard deviation that says so
-        ASSERT_TRUE(exact.outline);
-        EXPECT_LT(glm::length(exact.outline->center_px - ball.center_px),
-                  2.5 * exact.outline->center_sigma);
-        EXPECT_LT(std::abs(exact.outline->radius_px - ball.radius_px),
-                  2.5 * exact.outline->radius_sigma);
-    }
 }
 
 }  // namespace

@@ -129,6 +129,39 @@ TEST(ReadBracket, NamesTheFileWithoutExposureAndTheRemedy)
     EXPECT_THAT(message, HasSubstr("exposure_seconds"));
 }
 
+// A picture's middle stays in the middle; what a smaller one lacks may not be used.
+TEST(ReadBracket, HandCutPicturesOfUnequalSizeComeToLieMiddleOnMiddle)
+{
+    const TemporaryFolder folder;
+    EncodedImage large = grey(12, 10, 100);
+    large.codes(6, 5) = glm::u16vec3(200);
+    EncodedImage small = grey(10, 10, 50);
+    small.codes(5, 5) = glm::u16vec3(150);
+    writeEncoded(folder / "large.png", large);
+    writeEncoded(folder / "small.png", small);
+    const std::vector<std::filesystem::path> files = {folder / "large.png", folder / "small.png"};
+    const std::vector<Exposure> times = {{1.0, {}, {}}, {0.5, {}, {}}};
+    const Bracket bracket = readBracket(files, times, FrameSizes::HandCut);
+    EXPECT_TRUE(bracket.hand_cut);
+    EXPECT_TRUE(hasFinding(bracket.findings, "bracket-hand-cut"));
+    EXPECT_TRUE(bracket.frames[0].excluded.empty());
+    const BracketFrame& padded = bracket.frames[1];
+    ASSERT_EQ(padded.image.codes.width(), 12);
+    EXPECT_EQ(padded.image.codes(6, 5), glm::u16vec3(150));
+    EXPECT_EQ(padded.image.codes(0, 4), glm::u16vec3(50));
+    EXPECT_EQ(padded.excluded(0, 4), 1);
+    EXPECT_EQ(padded.excluded(1, 4), 0);
+    EXPECT_EQ(padded.excluded(10, 4), 0);
+    EXPECT_EQ(padded.excluded(11, 4), 1);
+
+    EXPECT_THAT(messageOf([&] { (void)readBracket(files, times); }), HasSubstr("same size"));
+    writeEncoded(folder / "small.png", grey(8, 10));
+    EXPECT_THAT(messageOf([&] { (void)readBracket(files, times, FrameSizes::HandCut); }),
+                HasSubstr("too different"));
+    writeEncoded(folder / "small.png", grey(12, 10));
+    EXPECT_FALSE(readBracket(files, times, FrameSizes::HandCut).hand_cut);
+}
+
 TEST(ReadBracket, RefusesMissingFilesAndAnEmptyList)
 {
     EXPECT_THAT(messageOf([] { (void)readBracket({"no/such/file.jpg"}); }),

@@ -258,5 +258,25 @@ TEST(Grain, PhotographWithoutNoiseGetsNone)
         EXPECT_LT(estimate.model.sigmaAt(c, 128.0), 0.1);
 }
 
+// Where the bracket does not show the response it may be as good as flat, and the sensor's law with
+// it endless: levels that nothing flat shows get no more than twice the deviation of those it does.
+TEST(Grain, OfLevelsThatNothingShowsIsBounded)
+{
+    ResponseCurve response = ResponseCurve::srgb();
+    for (auto& table : response.exposure)
+        for (std::size_t z = 200; z < table.size(); ++z)
+            table[z] = table[z - 1] * (1.0 + 1e-6);
+    const Image<Rgb> dark = picture(kWidth, kHeight, [](double x, double) {
+        return Rgb(0.02f + 0.2f * static_cast<float>(static_cast<int>(x) / kPatch) / 8.0f);
+    });
+    const GrainModel model = estimateGrain(SimulatedPhoto{}.take(dark, 3), response).model;
+    double seen = 0.0;
+    for (double code = 40.0; code < 130.0; code += 1.0)
+        seen = std::max(seen, model.sigmaAt(1, code));
+    ASSERT_GT(seen, 0.5);
+    for (const double code : {180.0, 210.0, 230.0, 255.0})
+        EXPECT_LE(model.sigmaAt(1, code), 2.2 * seen) << code;  // rounding is taken off
+}
+
 }  // namespace
 }  // namespace insitu

@@ -111,6 +111,22 @@ TEST_F(ProjectFile, GoodFileIsReadWhole)
     EXPECT_FALSE(project.objects[0].material);
 }
 
+TEST_F(ProjectFile, ABallWithoutOutlineIsLookedFor)
+{
+    EXPECT_FALSE(read(good()).light.probe->views[0].find_outline);
+    Json json = good();
+    Json& probe = json["light"]["probe"];
+    probe["ball"] = {{"radius_m", 0.06}};
+    EXPECT_TRUE(read(json).light.probe->views[0].find_outline);
+    // Half an outline is a slip.
+    probe["ball"]["radius_px"] = 258.1;
+    EXPECT_THAT(inputErrorOf([&] { (void)read(json); }), HasSubstr("center_px"));
+    probe["ball"] = {{"radius_m", 0.06}};
+    probe["center_m"] = "from-outline";
+    probe["view"] = "photo";
+    EXPECT_THAT(inputErrorOf([&] { (void)read(json); }), HasSubstr("needs the outline"));
+}
+
 TEST_F(ProjectFile, ExposureBesideAnImageOverridesTheOneBesideTheList)
 {
     Json json = good();

@@ -7,8 +7,7 @@
 #include "core/io/image_io.h"
 #include "core/io/json.h"
 #include "core/parallel.h"
-#include "tests/support/errors.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/pipeline/small_room.h"
 #include "tests/support/tolerance.h"
 
 #include <gmock/gmock.h>
@@ -16,7 +15,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <string>
 
@@ -27,68 +25,6 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 namespace fs = std::filesystem;
-
-/// A small furnished room with a window, written into a folder of its own.
-class SimulateRoom : public ::testing::Test {
-protected:
-    void SetUp() override
-    {
-        std::ofstream(folder_ / "tent.obj")
-            << "v -50 0 -50\nv 50 0 -50\nv 50 0 50\nv -50 0 50\nv 0 80 0\n"
-               "f 1 2 3 4\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
-        Image<Rgb> sky(16, 8, Rgb(0.5f, 0.7f, 1.0f));
-        writeRadiance(folder_ / "sky.exr", sky);
-    }
-    void TearDown() override { setThreadCount(0); }
-
-    [[nodiscard]] static Json good()
-    {
-        return Json::parse(R"({
-          "format": "insitu-room", "version": 1,
-          "room": {"min_m": [-2, 0, -2], "max_m": [2, 2.5, 3],
-            "surfaces": {
-              "floor": {"color_linear": [0.4, 0.25, 0.15], "size_m": 0.5,
-                        "checker": {"second_linear": [0.3, 0.2, 0.1]}},
-              "ceiling": {"color_linear": [0.8, 0.8, 0.8]},
-              "left": {"color_linear": [0.7, 0.7, 0.6]}, "right": {"color_linear": [0.7, 0.7, 0.6]},
-              "back": {"color_linear": [0.6, 0.7, 0.7]}, "front": {"color_linear": [0.7, 0.7, 0.6]}}},
-          "windows": [{"wall": "left", "from_m": [-1, 0.8], "to_m": [1, 2.2]}],
-          "environment": {"image": "sky.exr", "gain": [2, 2, 2]},
-          "lamps": [{"corner_m": [0.5, 2.49, 0], "edge_u_m": [0.5, 0, 0], "edge_v_m": [0, 0, 0.5],
-                     "radiance": [3, 2.5, 2]}],
-          "boxes": [{"name": "crate", "min_m": [0.8, 0, -1.6], "max_m": [1.5, 0.6, -1],
-                     "surface": {"color_linear": [0.3, 0.5, 0.3]}}],
-          "furniture": [{"model": "tent.obj", "position_m": [-1.2, 0, -1.2], "scale": 0.01,
-                         "matte": true}],
-          "camera": {"position_m": [1.1, 1.4, 2.6], "target_m": [-0.1, 0.6, -0.5],
-                     "focal_px": 52, "width": 64, "height": 48},
-          "object": {"model": "tent.obj", "pivot": "bottom-center", "position_m": [0, 0, 0],
-                     "scale": 0.008,
-                     "material": {"base_color_linear": [0.5, 0.1, 0.1], "specular": 0}},
-          "ball": {"center_m": [0, 0.4, 0], "radius_m": 0.06, "view_position_m": [0.4, 0.6, 1],
-                   "size_px": 48},
-          "photography": {"ball_seconds": [0.5, 0.03125]},
-          "render": {"samples_per_pixel": 4, "ball_samples_per_pixel": 16,
-                     "panorama_samples_per_pixel": 16, "panorama_width": 32},
-          "seed": 3})");
-    }
-
-    [[nodiscard]] SimulatedRoom read(const Json& json) const
-    {
-        std::ofstream(folder_ / "room.json") << json.dump();
-        return readSimulatedRoom(folder_ / "room.json");
-    }
-
-    [[nodiscard]] std::string complaint(const std::function<void(Json&)>& change) const
-    {
-        Json json = good();
-        change(json);
-        return inputErrorOf([&] { (void)read(json); });
-    }
-
-    TemporaryFolder folder_;
-    Progress silent_;
-};
 
 TEST_F(SimulateRoom, BadRoomsAreRefused)
 {
@@ -131,6 +67,14 @@ TEST_F(SimulateRoom, BadRoomsAreRefused)
                     j["ball"]["view_position_m"] = {0, 0.4, 0.1};
                 }),
                 HasSubstr("too near"));
+    EXPECT_THAT(complaint([](Json& j) {
+                    j["ball"]["further_view_positions_m"] = {{0.4, 0.6, 1}, {0, 0.4, 9}};
+                }),
+                AllOf(HasSubstr("further_view_positions_m[1]"), HasSubstr("outside")));
+    EXPECT_THAT(complaint([](Json& j) {
+                    j["ball"]["view_position_m"] = {0, 1.4, 0};
+                }),
+                HasSubstr("straight up or down"));
     EXPECT_THAT(complaint([](Json& j) { j["photography"]["ball_seconds"] = Json::array(); }),
                 HasSubstr("empty"));
     EXPECT_THAT(complaint([](Json& j) { j["render"]["samples_per_pixel"] = 0; }),
@@ -149,11 +93,11 @@ TEST_F(SimulateRoom, SameBytesForEveryNumberOfThreads)
     setThreadCount(4);
     const SimulatedCapture four = simulate(room, silent_);
     EXPECT_EQ(one.truth.plate, four.truth.plate);
-    EXPECT_EQ(one.truth.ball, four.truth.ball);
+    EXPECT_EQ(one.truth.balls, four.truth.balls);
     EXPECT_EQ(one.truth.panorama, four.truth.panorama);
     EXPECT_EQ(one.plate.image.codes, four.plate.image.codes);
     EXPECT_EQ(one.with.image.codes, four.with.image.codes);
-    EXPECT_EQ(one.bracket.at(1).image.codes, four.bracket.at(1).image.codes);
+    EXPECT_EQ(one.brackets.at(0).at(1).image.codes, four.brackets.at(0).at(1).image.codes);
     EXPECT_EQ(one.lines.segments.at(0).to_px, four.lines.segments.at(0).to_px);
 }
 
@@ -169,7 +113,7 @@ TEST_F(SimulateRoom, WhatIsWrittenIsAProject)
     EXPECT_EQ(project.photo.path, out / "plate.jpg");
     ASSERT_TRUE(project.light.probe);
     EXPECT_THAT(project.light.probe->views[0].images, SizeIs(2));
-    EXPECT_EQ(project.light.probe->views[0].view_position_m, room.ball_view_m);
+    EXPECT_EQ(project.light.probe->views[0].view_position_m, room.ball_views_m.at(0));
     EXPECT_EQ(project.light.probe->views[0].ball.radius_px, room.ball.radius_px);
     ASSERT_THAT(project.room.boxes, SizeIs(3));  // room, crate, tent
     EXPECT_EQ(project.room.boxes[1].name, "crate");
@@ -251,8 +195,8 @@ TEST_F(SimulateRoom, BallAndPanoramaAgree)
     const SimulatedTruth truth = renderRoom(room, scene, silent_);
     UnwrapOptions options;
     options.width = 32;
-    const Camera camera = ballCamera(room.ball, room.ball_view_m, 96, 96);
-    const LightProbe probe = unwrapMirrorBall(truth.ball, room.ball, camera, options);
+    const Camera camera = ballCamera(room.ball, room.ball_views_m.at(0), 96, 96);
+    const LightProbe probe = unwrapMirrorBall(truth.balls.at(0), room.ball, camera, options);
     double ball = 0.0;
     double panorama = 0.0;
     double difference = 0.0;
