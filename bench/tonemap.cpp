@@ -1,7 +1,8 @@
 // Global, local and selective tone mapping side by side: speed and error in one run, the tables 12
 // to 16 of [Michael10] for our operators.
 //
-//   tonemap [--runs N] [--threshold T] [--saliency] [--inserted SHARE] PICTURE[@MEGAPIXELS]…
+//   tonemap [--runs N] [--threshold T] [--reinhard] [--saliency] [--inserted SHARE]
+//       PICTURE[@MEGAPIXELS]…
 //   tonemap --histogram [--threads N] PICTURE[@MEGAPIXELS]…
 //
 // Pictures are .exr, .hdr or .pfm; with @MEGAPIXELS resampled to that size first (by area, or cubic
@@ -9,9 +10,11 @@
 // and writing of files; other programs on the machine count little then. Errors are those of
 // the curve alone (GTM) and of selective mapping (STM) against the local operator (LTM); of
 // pictures above 6 megapixels in their middle 2048x2048 pixels. Below 3 megapixels the local
-// operator is also compared with its direct evaluation.
+// operator is also compared with its direct evaluation. The local operator is Ashikhmin's, or with
+// --reinhard Reinhard's.
 #include "composite/tonemap/ashikhmin.h"
 #include "composite/tonemap/histogram_adjustment.h"
+#include "composite/tonemap/reinhard.h"
 #include "composite/tonemap/selective.h"
 #include "core/io/image_io.h"
 #include "core/parallel.h"
@@ -182,6 +185,7 @@ struct BenchOptions {
     int runs = 5;
     double threshold = SelectiveOptions{}.importance_threshold;
     bool saliency = false;
+    bool reinhard = false;
     double inserted = 0.0;
     bool histogram = false;
     int threads = 0;
@@ -256,7 +260,8 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
 {
     Progress silent;
     const Image<Rgb> scene = readPicture(argument);
-    const std::shared_ptr<const SeparableOperator> operator_whole = makeAshikhmin();
+    const std::shared_ptr<const SeparableOperator> operator_whole =
+        options.reinhard ? makeReinhardLocal({}) : makeAshikhmin();
     const GlobalPart global(operator_whole);
     SelectiveOptions selection;
     selection.importance_threshold = options.threshold;
@@ -298,7 +303,7 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
         selective_errors.ssim,
         selective_errors.vdp_percent,
         1.0 / (selective_seconds * std::max(selective_errors.vdp_percent, 0.01)));
-    if (scene.pixelCount() < 3'000'000) compareWithDirect(scene, ltm);
+    if (scene.pixelCount() < 3'000'000 && !options.reinhard) compareWithDirect(scene, ltm);
     if (options.inserted > 0.0)
         benchInserted(options, scene, statistics, operator_whole, local_seconds);
     std::cout << std::flush;
@@ -322,6 +327,8 @@ int main(int argc, char** argv)
     insitu::BenchOptions options;
     app.add_option("--runs", options.runs, "Runs, of which the quickest counts");
     app.add_option("--threshold", options.threshold, "Importance threshold");
+    app.add_flag(
+        "--reinhard", options.reinhard, "Reinhard's local operator in place of Ashikhmin's");
     app.add_flag("--saliency", options.saliency, "Also selection by a saliency map");
     app.add_option("picture", options.pictures, "FILE or FILE@MEGAPIXELS")->required();
     app.add_option("--inserted", options.inserted, "Also an object of this share of the picture");

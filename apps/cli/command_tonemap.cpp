@@ -51,8 +51,9 @@ void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Cont
     context.start();
     if (arguments.same_curve && !arguments.tone.sharesCurves())
         throw CLI::ValidationError("--same-curve",
-                                   "operator histogram makes its curve from each picture's foveal "
-                                   "image; leave one of the two out");
+                                   "operator " + arguments.tone.name() +
+                                       " makes its curve from each picture alone; leave one of "
+                                       "the two out");
     const std::vector<fs::path> outputs = outputsOf(arguments);
     for (const fs::path& output : outputs)
         context.checkOutput(output);

@@ -1,5 +1,6 @@
 #include "apps/cli/tonemap_options.h"
 
+#include "composite/tonemap/library_operators.h"
 #include "core/io/image_io.h"
 
 #include <algorithm>
@@ -18,8 +19,8 @@ struct FlagUse {
 
 const std::vector<FlagUse>& flagUses()
 {
-    static const std::vector<FlagUse> uses = {{"--key", {"reinhard"}},
-                                              {"--white", {"reinhard"}},
+    static const std::vector<FlagUse> uses = {{"--key", {"reinhard", "reinhard-local"}},
+                                              {"--white", {"reinhard", "reinhard-local"}},
                                               {"--contrast-threshold", {"ashikhmin"}},
                                               {"--scene-white-cd-m2", {"ashikhmin", "histogram"}},
                                               {"--display-white-cd-m2", {"ashikhmin", "histogram"}},
@@ -28,6 +29,7 @@ const std::vector<FlagUse>& flagUses()
                                               {"--veil", {"histogram"}},
                                               {"--acuity", {"histogram"}},
                                               {"--mesopic-color", {"histogram"}},
+                                              {"--base-contrast", {"durand"}},
                                               {"--select", {"selective"}},
                                               {"--importance-threshold", {"selective"}},
                                               {"--importance", {"selective"}},
@@ -55,19 +57,35 @@ void TonemapOptions::addTo(CLI::App& command)
     command
         .add_option("--operator",
                     name_,
-                    "reinhard (global), ashikhmin (local), selective (local where it matters), "
-                    "histogram (what an observer there could see)")
-        ->check(CLI::IsMember({"reinhard", "ashikhmin", "selective", "histogram"}))
+                    "global: reinhard, drago, reinhard-devlin; local: reinhard-local, ashikhmin, "
+                    "durand; selective (local where it matters); histogram (what an "
+                    "observer there could see)")
+        ->check(CLI::IsMember({"reinhard",
+                               "drago",
+                               "reinhard-devlin",
+                               "reinhard-local",
+                               "ashikhmin",
+                               "durand",
+                               "selective",
+                               "histogram"}))
         ->capture_default_str();
-    command.add_option("--key", reinhard_.key, "Where the average luminance lands (reinhard)")
+    command
+        .add_option(
+            "--key", reinhard_.key, "Where the average luminance lands (reinhard, reinhard-local)")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     command
         .add_option("--white",
                     reinhard_.white,
                     "Smallest scaled luminance shown as white; default: the brightest pixel "
-                    "(reinhard)")
+                    "(reinhard, reinhard-local)")
         ->check(CLI::PositiveNumber);
+    command
+        .add_option("--base-contrast",
+                    durand_.base_contrast,
+                    "Contrast that is left of large-scale brightness (durand)")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
     command
         .add_option("--contrast-threshold",
                     ashikhmin_.contrast_threshold,
@@ -109,7 +127,7 @@ void TonemapOptions::addTo(CLI::App& command)
                   "Loss of colour in dim light (histogram)")
         ->default_str("true");
     command.add_option("--select", selected_, "Operator whose local part is selected (selective)")
-        ->check(CLI::IsMember({"ashikhmin"}))
+        ->check(CLI::IsMember({"ashikhmin", "reinhard-local"}))
         ->capture_default_str();
     command
         .add_option("--importance-threshold",
@@ -127,9 +145,17 @@ void TonemapOptions::addTo(CLI::App& command)
         options[i]->group("Tone mapping");
 }
 
+bool TonemapOptions::sharesCurves() const
+{
+    static const std::vector<std::string> separable = {
+        "reinhard", "reinhard-local", "ashikhmin", "selective"};
+    return std::find(separable.begin(), separable.end(), name_) != separable.end();
+}
+
 std::unique_ptr<SeparableOperator> TonemapOptions::makeSeparable(const std::string& name) const
 {
     if (name == "reinhard") return makeReinhard(reinhard_);
+    if (name == "reinhard-local") return makeReinhardLocal(reinhard_);
     AshikhminOptions options = ashikhmin_;
     options.viewing = viewing_;
     return makeAshikhmin(options);
@@ -154,6 +180,9 @@ std::unique_ptr<ToneMapOperator> TonemapOptions::make(const CLI::App& command,
         histogram.viewing = viewing_;
         return makeHistogramAdjustment(histogram);
     }
+    if (name_ == "durand") return makeDurand(durand_);
+    if (name_ == "drago") return makeLibraryOperator(LibraryOperator::Drago);
+    if (name_ == "reinhard-devlin") return makeLibraryOperator(LibraryOperator::ReinhardDevlin);
     if (!selective) return makeSeparable(name_);
     SelectiveOptions options;
     options.importance_threshold = importance_threshold_;

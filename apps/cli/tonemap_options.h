@@ -1,6 +1,7 @@
 #pragma once
 
 #include "composite/tonemap/ashikhmin.h"
+#include "composite/tonemap/durand.h"
 #include "composite/tonemap/histogram_adjustment.h"
 #include "composite/tonemap/reinhard.h"
 #include "composite/tonemap/selective.h"
@@ -24,7 +25,8 @@ public:
     [[nodiscard]] std::unique_ptr<ToneMapOperator> make(const CLI::App& command,
                                                         const Image<float>& always = {}) const;
     /// False when the operator makes its curve from the picture alone.
-    [[nodiscard]] bool sharesCurves() const { return name_ != "histogram"; }
+    [[nodiscard]] bool sharesCurves() const;
+    [[nodiscard]] const std::string& name() const { return name_; }
 
 private:
     [[nodiscard]] std::unique_ptr<SeparableOperator> makeSeparable(const std::string& name) const;
@@ -34,6 +36,7 @@ private:
     ReinhardOptions reinhard_;
     ViewingOptions viewing_;
     AshikhminOptions ashikhmin_;
+    DurandOptions durand_;
     HistogramAdjustmentOptions histogram_;
     double importance_threshold_ = SelectiveOptions{}.importance_threshold;
     std::filesystem::path importance_;

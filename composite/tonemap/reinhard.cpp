@@ -1,5 +1,7 @@
 #include "composite/tonemap/reinhard.h"
 
+#include "composite/tonemap/reinhard_adaptation.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -38,16 +40,21 @@ private:
 
 class Reinhard : public SeparableOperator {
 public:
-    explicit Reinhard(const ReinhardOptions& options) : options_(options) {}
+    Reinhard(const ReinhardOptions& options, bool local) : options_(options), local_(local) {}
 
     [[nodiscard]] std::unique_ptr<ToneCurve> curve(const SceneStatistics& statistics) const override
     {
         return std::make_unique<ReinhardCurve>(options_, statistics);
     }
-    [[nodiscard]] std::unique_ptr<LocalAdaptation> local() const override { return nullptr; }
+    [[nodiscard]] std::unique_ptr<LocalAdaptation> local() const override
+    {
+        if (!local_) return nullptr;
+        return std::make_unique<tonemap::ReinhardAdaptation>(options_.key);
+    }
 
 private:
     ReinhardOptions options_;
+    bool local_;
 };
 
 }  // namespace
@@ -70,7 +77,13 @@ Findings ReinhardOptions::validate() const
 std::unique_ptr<SeparableOperator> makeReinhard(const ReinhardOptions& options)
 {
     requireValid(options.validate(), "tone mapping");
-    return std::make_unique<Reinhard>(options);
+    return std::make_unique<Reinhard>(options, false);
+}
+
+std::unique_ptr<SeparableOperator> makeReinhardLocal(const ReinhardOptions& options)
+{
+    requireValid(options.validate(), "tone mapping");
+    return std::make_unique<Reinhard>(options, true);
 }
 
 }  // namespace insitu

@@ -7,7 +7,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
+#include <set>
 
 namespace insitu::cli {
 namespace {
@@ -181,6 +183,47 @@ TEST(Tonemap, ChoosesOperatorsAndRefusesForeignFlags)
         run({"--operator", "selective", "--always", (folder / "map.png").string()});
     EXPECT_EQ(unfit.exit_code, kFailed);
     EXPECT_THAT(unfit.messages, HasSubstr("5x6"));
+}
+
+TEST(Tonemap, HasTheOperatorsThatItNames)
+{
+    const TemporaryFolder folder;
+    Image<Rgb> scene(24, 16);
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 24; ++x)
+            scene(x, y) = Rgb(std::exp2(0.5f * static_cast<float>(x)));
+    writeRadiance(folder / "in.exr", scene);
+    const auto run = [&](std::vector<std::string> more) {
+        std::vector<std::string> arguments = {"tonemap",
+                                              (folder / "in.exr").string(),
+                                              "-o",
+                                              (folder / "out.png").string(),
+                                              "--force"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return runProgram(arguments);
+    };
+    std::set<std::string> pictures;
+    const std::vector<std::string> operators = {"reinhard",
+                                                "drago",
+                                                "reinhard-devlin",
+                                                "reinhard-local",
+                                                "ashikhmin",
+                                                "durand",
+                                                "histogram"};
+    for (const std::string& name : operators) {
+        const ProgramRun mapped = run({"--operator", name, "-q"});
+        EXPECT_EQ(mapped.exit_code, kDone) << mapped.messages;
+        EXPECT_EQ(mapped.messages, "") << name;
+        pictures.insert(fileBytes(folder / "out.png"));
+    }
+    EXPECT_EQ(pictures.size(), operators.size()) << "each its own picture";
+    EXPECT_EQ(run({"--operator", "selective", "--select", "reinhard-local"}).exit_code, kDone);
+    EXPECT_EQ(run({"--operator", "durand", "--base-contrast", "20"}).exit_code, kDone);
+    // Flags of another operator, and one curve for operators that make their own.
+    EXPECT_EQ(run({"--operator", "drago", "--base-contrast", "20"}).exit_code, kWrongUsage);
+    const ProgramRun shared = run({"--operator", "durand", "--same-curve"});
+    EXPECT_EQ(shared.exit_code, kWrongUsage);
+    EXPECT_THAT(shared.messages, HasSubstr("durand"));
 }
 
 TEST(Compare, JudgesEncodedPicturesAsTheyAreSeen)
