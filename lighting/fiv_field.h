@@ -1,6 +1,7 @@
 #pragma once
 
 #include "lighting/hidden_light.h"
+#include "lighting/shell_lookup.h"
 
 #include <glm/glm.hpp>
 
@@ -51,20 +52,10 @@ public:
     [[nodiscard]] std::size_t memoryBytes() const { return nodes_.size() * sizeof(nodes_[0]); }
 
 private:
-    /// x, y and z of all channels; the fourth channel is unused.
-    struct alignas(16) Node {
-        std::array<float, 4> axis[3];
-    };
-    /// Eight nodes around a place with their weights.
-    struct Corners {
-        std::array<std::uint32_t, 8> nodes{};
-        std::array<float, 8> weights{};
-    };
-    [[nodiscard]] Corners cornersOf(glm::vec3 x_local) const;
-
     ShellFieldOptions options_;
     glm::vec3 half_extent_{1.0f};
-    std::vector<Node> nodes_;  ///< azimuth runs fastest, then the polar angle, then the shell
+    fiv::ShellGrid grid_;
+    std::vector<fiv::ShellNode> nodes_;
 };
 
 /// A plane whose points receive light: floor, wall or table top, in the object's own axes.

@@ -50,7 +50,9 @@ TEST_F(Field, ShellsHoldTheExactVectorsAtTheirNodes)
 {
     const ShellFieldOptions size{16, 9, 5, 0.4, 6.4};
     const ShellField field(object_, size);
-    EXPECT_EQ(field.memoryBytes(), 16u * 9u * 5u * 48u);
+    // The first azimuth again at the end of each row, and a node that look-ups read beyond the
+    // last.
+    EXPECT_EQ(field.memoryBytes(), (17u * 9u * 5u + 1u) * 48u);
     for (int i = 0; i < 16; ++i)
         for (int j = 1; j < 8; ++j)
             for (int k = 0; k < 5; ++k) {
@@ -168,6 +170,52 @@ TEST_F(Field, TheUndersideOfTheTopReceivesToo)
     EXPECT_LT(own.at({0.5, 0.5}).g, 0.1 * sky);
     EXPECT_GT(own.at({0.5, 0.5}).g, 0.0);
     EXPECT_GT(naive.at({0.5, 0.5}).g, 0.3 * sky);
+}
+
+TEST(ShellLookUp, EveryInstructionSetGivesTheSameBytes)
+{
+    const fiv::ShellGrid grid{12, 7, 4, 0.5f, 4.0f, 1.0f};
+    std::vector<fiv::ShellNode> nodes(13 * 7 * 4 + 1);
+    RandomStream random(41, 0, 0);
+    for (fiv::ShellNode& node : nodes)
+        for (auto& axis : node.axis)
+            for (int c = 0; c < 3; ++c)
+                axis[static_cast<std::size_t>(c)] = 2.0f * random.uniform() - 1.0f;
+    // Inside the first shell, beyond the last, on the axis, in the centre; no multiple of a batch.
+    std::vector<glm::vec3> places = {{0, 0, 0}, {0, 1, 0}, {0, -2, 0}, {1e-20f, 0, 0}, {9, 0, -9}};
+    while (places.size() < 203)
+        places.push_back(6.0f * glm::vec3(random.uniform(), random.uniform(), random.uniform()) -
+                         3.0f);
+    std::vector<glm::vec3> normals;
+    for (std::size_t i = 0; i < places.size(); ++i)
+        normals.push_back(glm::normalize(
+            glm::vec3(random.uniform() - 0.5f, random.uniform(), random.uniform() - 0.5f)));
+    const auto with = [&](InstructionSet isa) {
+        std::vector<Rgb> hidden(places.size());
+        fiv::lookUpShells(isa, grid, nodes, glm::vec3(1.0f), places, normals, hidden);
+        return hidden;
+    };
+    const std::vector<Rgb> base = with(InstructionSet::Base);
+    for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa)
+        EXPECT_EQ(with(static_cast<InstructionSet>(isa)), base) << isa;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        // The same by the corners one place at a time.
+        const fiv::ShellCorners corners = fiv::shellCorners(grid, places[i]);
+        glm::vec3 sum(0.0f);
+        for (std::size_t k = 0; k < 8; ++k) {
+            const auto node = static_cast<std::size_t>(corners.node) + (k & 1) + (k >> 1 & 1) * 13 +
+                              (k >> 2) * 13 * 7;
+            for (int c = 0; c < 3; ++c)
+                for (int axis = 0; axis < 3; ++axis)
+                    sum[c] += corners.weights[k] * normals[i][axis] *
+                              nodes[node].axis[axis][static_cast<std::size_t>(c)];
+        }
+        const float extent = glm::dot(glm::vec3(1.0f), glm::abs(normals[i]));
+        const float height = -glm::dot(places[i], normals[i]) / extent;
+        const float share = std::clamp(0.5f * (height + 1.0f), 0.0f, 1.0f);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(base[i][c], std::max(0.0f, share * sum[c]), 1e-5f) << i;
+    }
 }
 
 TEST_F(Field, RefusesBadOptions)
