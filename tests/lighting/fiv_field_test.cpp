@@ -172,6 +172,41 @@ TEST_F(Field, TheUndersideOfTheTopReceivesToo)
     EXPECT_GT(naive.at({0.5, 0.5}).g, 0.3 * sky);
 }
 
+// Azimuth, polar angle and logarithm of the distance in double precision.
+TEST(ShellLookUp, CornersAreWhereTheAnglesSay)
+{
+    const fiv::ShellGrid grid{12, 7, 5, 0.5f, 8.0f, 1.0f};
+    RandomStream random(42, 0, 0);
+    for (int trial = 0; trial < 500; ++trial) {
+        const double azimuth = 12.0 * random.uniformDouble();
+        const double polar = 6.0 * random.uniformDouble();
+        const double shell = 5.0 * random.uniformDouble();  // the last fifth beyond the last shell
+        const double distance = 0.5 * std::exp2(shell);
+        const double theta = pi * polar / 6.0;
+        const double phi = 2.0 * pi * azimuth / 12.0;
+        const fiv::ShellCorners corners =
+            fiv::shellCorners(grid,
+                              glm::vec3(distance * glm::dvec3(std::sin(theta) * std::cos(phi),
+                                                              std::cos(theta),
+                                                              std::sin(theta) * std::sin(phi))));
+        // Centre of gravity of the corners' numbers; a turn is a turn.
+        glm::dvec3 at(0.0);
+        double sum = 0.0;
+        for (int k = 0; k < 8; ++k) {
+            const double w = corners.weights[static_cast<std::size_t>(k)];
+            sum += w;
+            at += w * glm::dvec3(k & 1, k >> 1 & 1, k >> 2);
+        }
+        at = at / sum +
+             glm::dvec3(corners.node % 13, corners.node / 13 % 7, corners.node / (13 * 7));
+        const double fall = shell > 4.0 ? std::exp2(2.0 * (4.0 - shell)) : 1.0;
+        EXPECT_NEAR(sum, fall, 1e-5) << shell;
+        EXPECT_NEAR(std::remainder(at.x - azimuth, 12.0), 0.0, 2e-5 / std::sin(theta)) << trial;
+        EXPECT_NEAR(at.y, polar, 2e-5) << trial;
+        EXPECT_NEAR(at.z, std::min(shell, 4.0), 2e-5) << trial;
+    }
+}
+
 TEST(ShellLookUp, EveryInstructionSetGivesTheSameBytes)
 {
     const fiv::ShellGrid grid{12, 7, 4, 0.5f, 4.0f, 1.0f};
