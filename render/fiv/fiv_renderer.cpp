@@ -2,6 +2,7 @@
 
 #include "render/fiv/object_light.h"
 #include "render/fiv/object_pixels.h"
+#include "render/fiv/object_samples.h"
 #include "render/fiv/receiver_pixels.h"
 
 #include <algorithm>
@@ -106,9 +107,10 @@ void lightEachOther(FivScene& scene,
 {
     const std::vector<ObjectSample> samples = sampleObjects(scene.objects, fiv.object_samples);
     std::vector<ObjectShading::Place> places;
-    for (const ObjectSample& sample : samples)
-        places.push_back(
-            {sample.point.position, sample.point.geometric_normal, sample.point.geometric_normal});
+    for (const ObjectSample& sample : samples) {
+        places.push_back(ObjectShading::placeOf(sample.point));
+        places.back().normal = sample.point.geometric_normal;
+    }
     for (int round = 0; round < 3; ++round) {
         if (round == 2) scene.room_change = roomChange(scene, receivers);
         if (round > 0) shading.update(/*room_too=*/round == 2);

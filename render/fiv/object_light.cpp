@@ -2,6 +2,7 @@
 
 #include "core/color.h"
 #include "core/parallel.h"
+#include "lighting/sampling.h"
 #include "render/bsdf/bsdf.h"
 #include "render/bsdf/ggx_albedo.h"
 
@@ -23,6 +24,9 @@ constexpr int kGlossyLevels = 5;
 constexpr float kSmooth = 0.25f;
 /// Share of hidden light beyond which the open light is not known from the mean.
 constexpr float kMostGain = 4.0f;
+/// Short rays of a place: the first few, and all where one of these meets something.
+constexpr int kFirstRays = 8;
+constexpr int kNearRays = 32;
 
 /// Metal of this base colour, times `scale`, has the same glossy lobe.
 struct GlossyLobe {
@@ -52,8 +56,9 @@ Rgb diffuseReflectance(const SurfaceMaterial& m, double cosine)
     return base;
 }
 
-/// What of even light the surface reflects in all.
-Rgb reflectance(const SurfaceMaterial& m)
+}  // namespace
+
+Rgb evenReflectance(const SurfaceMaterial& m)
 {
     const GlossyLobe lobe = glossyLobe(m);
     const ggx::Albedo albedo = ggx::meanAlbedo(m.roughness);
@@ -65,7 +70,13 @@ Rgb reflectance(const SurfaceMaterial& m)
            glossy;
 }
 
-}  // namespace
+ObjectShading::Place ObjectShading::placeOf(const SurfacePoint& point)
+{
+    return {point.position,
+            point.shading_normal,
+            point.geometric_normal,
+            evenReflectance(point.material)};
+}
 
 ObjectShading::ObjectShading(const FivScene& scene, const ObjectLightOptions& options)
     : scene_(scene), options_(options)
@@ -73,6 +84,13 @@ ObjectShading::ObjectShading(const FivScene& scene, const ObjectLightOptions& op
     for (const ObjectScene::Object& object : scene.objects.objects())
         for (const Material& m : object.model.materials)
             any_glossy_ = any_glossy_ || m.specular > 0.0f || m.metallic > 0.0f;
+    const SilhouetteSet& set = scene.coarse.silhouettes;
+    double texels_m = 0.0;
+    for (const SilhouetteFrame& frame : set.frames)
+        texels_m += set.local.radius * static_cast<double>(frame.texel_depth) /
+                    glm::length(glm::dvec3(frame.depth_axis));
+    near_m_ = (static_cast<double>(options.bias_texels) - 0.5) * texels_m /
+              static_cast<double>(set.frames.size());
     lookFromNodes(options.node_spacing_m);
     update(/*room_too=*/true);
 }
@@ -190,6 +208,32 @@ Rgb ObjectShading::spotIrradiance(const Place& place) const
     return Rgb(sum);
 }
 
+float ObjectShading::hiddenNearby(const Place& place) const
+{
+    SurfacePoint point;
+    point.position = place.position;
+    point.geometric_normal = place.geometric_normal;
+    const glm::dvec3 start = scene_.objects.leave(point, place.geometric_normal);
+    const glm::dmat3 to_world = frameFromNormal(place.normal);
+    const auto fraction = [](double value) {
+        return static_cast<float>(value - std::floor(value));
+    };
+    int met = 0;
+    int rays = kFirstRays;
+    for (int i = 0; i < rays; ++i) {
+        // Additive recurrence with the plastic number: every beginning of it is even.
+        const glm::dvec3 direction =
+            to_world * cosineHemisphere({fraction(0.5 + 0.7548776662466927 * i),
+                                         fraction(0.5 + 0.5698402909980532 * i)});
+        // Below the surface by its own curvature, not by what lies near.
+        if (glm::dot(direction, place.geometric_normal) > 0.0 &&
+            scene_.objects.occluded(start, direction, near_m_))
+            ++met;
+        if (i + 1 == kFirstRays && met > 0) rays = kNearRays;
+    }
+    return static_cast<float>(met) / static_cast<float>(rays);
+}
+
 std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Place> places) const
 {
     std::vector<glm::vec3> local(places.size());
@@ -213,6 +257,13 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
             r.smooth[c] = all[c] > 0.0f ? open[c] * std::min(left[c] / all[c], kMostGain) : left[c];
         const float level = luminance(all);
         r.open = level > 0.0f ? std::clamp(luminance(left) / level, 0.0f, 1.0f) : 1.0f;
+        if (scene_.light != FivLight::Cube) {
+            // What hides nearby is lit as the place is, and sends its share of that back.
+            const float hidden = hiddenNearby(places[i]);
+            r.smooth *=
+                (1.0f - hidden) / (1.0f - hidden * glm::min(places[i].reflectance, Rgb(0.95f)));
+            r.open *= 1.0f - hidden;
+        }
         if (!scene_.spots.spots().empty()) r.spots = spotIrradiance(places[i]);
     }
     return result;
@@ -277,100 +328,6 @@ Rgb ObjectShading::radiance(const SurfacePoint& point,
               diffuseReflectance(point.material, cosine) * (received.smooth + received.spots) / kPi;
     if (isGlossy(point.material)) sum += glossy(point, wo, received);
     return sum;
-}
-
-std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
-{
-    struct Piece {
-        std::size_t object = 0;
-        std::size_t triangle = 0;
-    };
-    std::vector<Piece> pieces;
-    std::vector<double> areas;
-    double total = 0.0;
-    for (std::size_t o = 0; o < objects.objects().size(); ++o) {
-        const TriangleMesh& mesh = objects.objects()[o].model.mesh;
-        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-            const glm::uvec3 corner = mesh.triangles[t];
-            const glm::dvec3 a(mesh.positions[corner.x]);
-            total += 0.5 * glm::length(glm::cross(glm::dvec3(mesh.positions[corner.y]) - a,
-                                                  glm::dvec3(mesh.positions[corner.z]) - a));
-            areas.push_back(total);
-            pieces.push_back({o, t});
-        }
-    }
-    std::vector<ObjectSample> samples;
-    if (!(total > 0.0)) return samples;
-    const auto fraction = [](double value) { return value - std::floor(value); };
-    for (int i = 0; i < count; ++i) {
-        const double wanted = (i + 0.5) / count * total;
-        const auto found = std::lower_bound(areas.begin(), areas.end(), wanted);
-        const Piece piece = pieces[static_cast<std::size_t>(
-            std::min(found - areas.begin(), static_cast<std::ptrdiff_t>(areas.size()) - 1))];
-        const TriangleMesh& mesh = objects.objects()[piece.object].model.mesh;
-        const glm::uvec3 corner = mesh.triangles[piece.triangle];
-        const glm::dvec3 a(mesh.positions[corner.x]);
-        const glm::dvec3 u = glm::dvec3(mesh.positions[corner.y]) - a;
-        const glm::dvec3 v = glm::dvec3(mesh.positions[corner.z]) - a;
-        const glm::dvec3 across = glm::cross(u, v);
-        if (!(glm::length(across) > 0.0)) continue;
-        // Additive recurrence with the plastic number.
-        double s = fraction(0.5 + 0.7548776662466927 * i);
-        double t = fraction(0.5 + 0.5698402909980532 * i);
-        if (s + t > 1.0) {
-            s = 1.0 - s;
-            t = 1.0 - t;
-        }
-        const glm::dvec3 place = a + s * u + t * v;
-        const glm::dvec3 normal = glm::normalize(across);
-        const double off = 1e-4 * std::sqrt(total);
-        for (const double side : {1.0, -1.0}) {
-            const auto point =
-                objects.intersect(place + side * off * normal, -side * normal, 2.0 * off);
-            if (point) samples.push_back({*point, total / count});
-        }
-    }
-    return samples;
-}
-
-void setGlow(FivScene& scene,
-             std::span<const ObjectSample> samples,
-             std::span<const ObjectShading::Received> received)
-{
-    const SilhouetteSet& set = scene.coarse.silhouettes;
-    const std::size_t pairs = scene.coarse.cells().pairCount();
-    std::vector<Rgb> sent(samples.size());
-    std::vector<glm::vec3> local(samples.size());
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-        const SurfaceMaterial& m = samples[i].point.material;
-        sent[i] = m.emissive + reflectance(m) * (received[i].smooth + received[i].spots) / kPi;
-        local[i] = scene.frame().localFrom(samples[i].point.position);
-    }
-    std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
-    ObjectGlow near;
-    for (std::size_t i = 0; i < samples.size(); ++i)
-        near.add(
-            samples[i].point.position, samples[i].point.geometric_normal, samples[i].area, sent[i]);
-    scene.near = std::move(near);
-    parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
-        const std::size_t pair = static_cast<std::size_t>(number);
-        glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
-        double weights[2] = {0.0, 0.0};
-        for (std::size_t i = 0; i < samples.size(); ++i) {
-            const double cosine = glm::dot(samples[i].point.geometric_normal, set.directions[pair]);
-            // What faces ω is seen by those who look along −ω.
-            const int side = cosine > 0.0 ? 1 : 0;
-            const HiddenShares shares = hiddenShares(set, pair, local[i], 1.5f);
-            const double hidden = cosine > 0.0 ? shares.along : shares.against;
-            const double weight = std::abs(cosine) * (1.0 - hidden) * samples[i].area;
-            sums[side] += weight * glm::dvec3(sent[i]);
-            weights[side] += weight;
-        }
-        for (int side = 0; side < 2; ++side)
-            if (weights[side] > 0.0)
-                glow[2 * pair + static_cast<std::size_t>(side)] = Rgb(sums[side] / weights[side]);
-    });
-    scene.glow = std::move(glow);
 }
 
 }  // namespace insitu

@@ -19,7 +19,8 @@ struct ObjectLightOptions {
 ///
 /// Irradiance as if nothing of the objects hid anything comes from a grid of places around them;
 /// the share of it that they hide from themselves from the atlas, under the mean of that light.
-/// What hides shines with its own mean radiance (FivScene::glow).
+/// What hides shines with its own mean radiance (FivScene::glow). What is nearer than the atlas can
+/// tell from the surface itself (`bias_texels`: creases, seams) is met by short rays.
 class ObjectShading {
 public:
     ObjectShading(const FivScene& scene, const ObjectLightOptions& options);
@@ -31,7 +32,9 @@ public:
         glm::dvec3 position{0.0};
         glm::dvec3 normal{0.0};            ///< for shading
         glm::dvec3 geometric_normal{0.0};  ///< same side
+        Rgb reflectance{0.0f};             ///< of even light, in all
     };
+    [[nodiscard]] static Place placeOf(const SurfacePoint& point);
     struct Received {
         Rgb smooth{0.0f};   ///< irradiance without that of spots
         Rgb spots{0.0f};    ///< irradiance of spots
@@ -48,6 +51,8 @@ private:
     void lookFromNodes(double spacing_m);
     [[nodiscard]] Rgb openIrradiance(const Place& place) const;
     [[nodiscard]] Rgb spotIrradiance(const Place& place) const;
+    /// Share of even light that surfaces nearer than the atlas tells hide.
+    [[nodiscard]] float hiddenNearby(const Place& place) const;
     [[nodiscard]] Rgb glossy(const SurfacePoint& point,
                              glm::dvec3 wo,
                              const Received& received) const;
@@ -55,6 +60,7 @@ private:
 
     const FivScene& scene_;
     ObjectLightOptions options_;
+    double near_m_ = 0.0;  ///< mean depth of the bias
     BoundingBox box_;
     glm::ivec3 node_count_{1};
     std::vector<PlaceLight> lights_;     ///< one a node
@@ -66,16 +72,7 @@ private:
     std::vector<DirectionTable> glossy_;  ///< of evenly spaced roughnesses, the last is 1
 };
 
-/// Points all over the objects, both sides of their surface, each standing for an equal area.
-struct ObjectSample {
-    SurfacePoint point;
-    double area = 0.0;
-};
-[[nodiscard]] std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count);
-
-/// Sets what the objects send (FivScene::glow, near) when their samples receive this.
-void setGlow(FivScene& scene,
-             std::span<const ObjectSample> samples,
-             std::span<const ObjectShading::Received> received);
+/// What of even light the surface reflects in all.
+[[nodiscard]] Rgb evenReflectance(const SurfaceMaterial& material);
 
 }  // namespace insitu

@@ -115,16 +115,11 @@ private:
     const FivScene& scene_;
 };
 
-ObjectShading::Place placeOf(const SurfacePoint& point)
-{
-    return {point.position, point.shading_normal, point.geometric_normal};
-}
-
 /// Points that lie on one smooth piece of surface are lit as their mean.
 void listPlaces(PixelPoints& pixel, std::vector<ObjectShading::Place>& places)
 {
     const SurfacePoint& first = pixel.points.front();
-    ObjectShading::Place mean = placeOf(first);
+    ObjectShading::Place mean = ObjectShading::placeOf(first);
     bool together = true;
     for (std::size_t i = 1; i < pixel.points.size() && together; ++i) {
         const SurfacePoint& point = pixel.points[i];
@@ -143,7 +138,7 @@ void listPlaces(PixelPoints& pixel, std::vector<ObjectShading::Place>& places)
     }
     for (const SurfacePoint& point : pixel.points) {
         pixel.place.push_back(places.size());
-        places.push_back(placeOf(point));
+        places.push_back(ObjectShading::placeOf(point));
     }
 }
 

@@ -1,0 +1,111 @@
+#include "render/fiv/object_samples.h"
+
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace insitu {
+
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+}  // namespace
+
+std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
+{
+    struct Piece {
+        std::size_t object = 0;
+        std::size_t triangle = 0;
+    };
+    std::vector<Piece> pieces;
+    std::vector<double> areas;
+    double total = 0.0;
+    for (std::size_t o = 0; o < objects.objects().size(); ++o) {
+        const TriangleMesh& mesh = objects.objects()[o].model.mesh;
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+            const glm::uvec3 corner = mesh.triangles[t];
+            const glm::dvec3 a(mesh.positions[corner.x]);
+            total += 0.5 * glm::length(glm::cross(glm::dvec3(mesh.positions[corner.y]) - a,
+                                                  glm::dvec3(mesh.positions[corner.z]) - a));
+            areas.push_back(total);
+            pieces.push_back({o, t});
+        }
+    }
+    std::vector<ObjectSample> samples;
+    if (!(total > 0.0)) return samples;
+    const auto fraction = [](double value) { return value - std::floor(value); };
+    for (int i = 0; i < count; ++i) {
+        const double wanted = (i + 0.5) / count * total;
+        const auto found = std::lower_bound(areas.begin(), areas.end(), wanted);
+        const Piece piece = pieces[static_cast<std::size_t>(
+            std::min(found - areas.begin(), static_cast<std::ptrdiff_t>(areas.size()) - 1))];
+        const TriangleMesh& mesh = objects.objects()[piece.object].model.mesh;
+        const glm::uvec3 corner = mesh.triangles[piece.triangle];
+        const glm::dvec3 a(mesh.positions[corner.x]);
+        const glm::dvec3 u = glm::dvec3(mesh.positions[corner.y]) - a;
+        const glm::dvec3 v = glm::dvec3(mesh.positions[corner.z]) - a;
+        const glm::dvec3 across = glm::cross(u, v);
+        if (!(glm::length(across) > 0.0)) continue;
+        // Additive recurrence with the plastic number.
+        double s = fraction(0.5 + 0.7548776662466927 * i);
+        double t = fraction(0.5 + 0.5698402909980532 * i);
+        if (s + t > 1.0) {
+            s = 1.0 - s;
+            t = 1.0 - t;
+        }
+        const glm::dvec3 place = a + s * u + t * v;
+        const glm::dvec3 normal = glm::normalize(across);
+        const double off = 1e-4 * std::sqrt(total);
+        for (const double side : {1.0, -1.0}) {
+            const auto point =
+                objects.intersect(place + side * off * normal, -side * normal, 2.0 * off);
+            if (point) samples.push_back({*point, total / count});
+        }
+    }
+    return samples;
+}
+
+void setGlow(FivScene& scene,
+             std::span<const ObjectSample> samples,
+             std::span<const ObjectShading::Received> received)
+{
+    const SilhouetteSet& set = scene.coarse.silhouettes;
+    const std::size_t pairs = scene.coarse.cells().pairCount();
+    std::vector<Rgb> sent(samples.size());
+    std::vector<glm::vec3> local(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const SurfaceMaterial& m = samples[i].point.material;
+        sent[i] = m.emissive + evenReflectance(m) * (received[i].smooth + received[i].spots) / kPi;
+        local[i] = scene.frame().localFrom(samples[i].point.position);
+    }
+    std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
+    ObjectGlow near;
+    for (std::size_t i = 0; i < samples.size(); ++i)
+        near.add(
+            samples[i].point.position, samples[i].point.geometric_normal, samples[i].area, sent[i]);
+    scene.near = std::move(near);
+    parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
+        const std::size_t pair = static_cast<std::size_t>(number);
+        glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
+        double weights[2] = {0.0, 0.0};
+        for (std::size_t i = 0; i < samples.size(); ++i) {
+            const double cosine = glm::dot(samples[i].point.geometric_normal, set.directions[pair]);
+            // What faces ω is seen by those who look along −ω.
+            const int side = cosine > 0.0 ? 1 : 0;
+            const HiddenShares shares = hiddenShares(set, pair, local[i], 1.5f);
+            const double hidden = cosine > 0.0 ? shares.along : shares.against;
+            const double weight = std::abs(cosine) * (1.0 - hidden) * samples[i].area;
+            sums[side] += weight * glm::dvec3(sent[i]);
+            weights[side] += weight;
+        }
+        for (int side = 0; side < 2; ++side)
+            if (weights[side] > 0.0)
+                glow[2 * pair + static_cast<std::size_t>(side)] = Rgb(sums[side] / weights[side]);
+    });
+    scene.glow = std::move(glow);
+}
+
+}  // namespace insitu

@@ -1,0 +1,61 @@
+// What lies nearer than the atlas can tell from a surface itself.
+#include "render/renderer.h"
+#include "tests/lighting/furniture_shapes.h"
+#include "tests/render/insertion_rooms.h"
+#include "tests/support/shapes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace insitu {
+namespace {
+
+constexpr float kAlbedo = 0.05f;
+constexpr float kSlot = 0.02f;  ///< width and depth, metres; a texel is about 0.03
+
+/// A slab of 1 m with a slot through its top, along z.
+ObjectScene slottedSlab()
+{
+    TriangleMesh mesh = shapes::box({-0.5f, 0.5f, -0.5f}, {0.5f, 0.6f, 0.5f});
+    insitu::shapes::append(mesh, shapes::box({-0.5f, 0.6f, -0.5f}, {-0.5f * kSlot, 0.6f + kSlot, 0.5f}));
+    insitu::shapes::append(mesh, shapes::box({0.5f * kSlot, 0.6f, -0.5f}, {0.5f, 0.6f + kSlot, 0.5f}));
+    std::vector<ObjectScene::Object> objects;
+    objects.push_back({shapes::model(mesh, shapes::lambert(glm::vec3(kAlbedo)))});
+    return ObjectScene(std::move(objects));
+}
+
+// Under an even sky the middle of a long slot's bottom receives the sine of the half angle that it
+// sees the sky under: of atan(1/2) for one as deep as wide. Its top receives all.
+TEST(FivCreases, ASlotThinnerThanATexelIsDark)
+{
+    RoomDescription room;
+    room.floors.push_back({});
+    const SceneProxy proxy(room);
+    const RoomLight light(proxy, uniform(1.0f), {0, 1, 0}, std::nullopt, coarse(), g_silent);
+    InsertionOptions options;
+    options.technique = Technique::Fiv;
+    options.fiv.atlas = {16, 48, 2};
+    options.fiv.object_face_size = 8;
+    options.fiv.receiver_node_spacing_m = 1.0;
+    options.fiv.interreflection = false;
+    // 2 mm a pixel.
+    const Camera camera = Camera::lookAt({0.0, 2.6, 1e-4}, {0.0, 0.62, 0.0}, 1000.0, 64, 32);
+    const RenderLayers layers =
+        renderInsertion(camera, light, slottedSlab(), options, g_silent).layers;
+    const auto received = [&](int x) {
+        return static_cast<double>(layers.object(x, 16).g / (kAlbedo * layers.alpha(x, 16)));
+    };
+    const double closed_form = std::sin(std::atan(0.5));
+    double bottom = 0.0;
+    for (const int x : {31, 32})
+        bottom += 0.5 * received(x);
+    // Low rays along the slot meet its walls beyond the short rays' reach.
+    EXPECT_NEAR(bottom, closed_form, 0.1);
+    for (const int x : {3, 10, 54, 60})
+        EXPECT_NEAR(received(x), 1.0, 0.02) << "nothing is near the flat top";
+}
+
+}  // namespace
+}  // namespace insitu
