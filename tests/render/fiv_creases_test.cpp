@@ -19,8 +19,8 @@ constexpr float kSlot = 0.02f;  ///< width and depth, metres; a texel is about 0
 ObjectScene slottedSlab()
 {
     TriangleMesh mesh = shapes::box({-0.5f, 0.5f, -0.5f}, {0.5f, 0.6f, 0.5f});
-    insitu::shapes::append(mesh, shapes::box({-0.5f, 0.6f, -0.5f}, {-0.5f * kSlot, 0.6f + kSlot, 0.5f}));
-    insitu::shapes::append(mesh, shapes::box({0.5f * kSlot, 0.6f, -0.5f}, {0.5f, 0.6f + kSlot, 0.5f}));
+    shapes::append(mesh, shapes::box({-0.5f, 0.6f, -0.5f}, {-0.5f * kSlot, 0.6f + kSlot, 0.5f}));
+    shapes::append(mesh, shapes::box({0.5f * kSlot, 0.6f, -0.5f}, {0.5f, 0.6f + kSlot, 0.5f}));
     std::vector<ObjectScene::Object> objects;
     objects.push_back({shapes::model(mesh, shapes::lambert(glm::vec3(kAlbedo)))});
     return ObjectScene(std::move(objects));
