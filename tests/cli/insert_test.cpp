@@ -224,14 +224,21 @@ TEST_F(InsertProject, AModelWithoutTrianglesOrWithAnUnknownExtension)
     EXPECT_THAT(odd.messages, HasSubstr("ACME_odd"));
 }
 
-TEST_F(InsertProject, OneExposureIsToldAndUsesTheSrgbCurve)
+TEST_F(InsertProject, OneExposureIsToldAndTheTechniqueTaken)
 {
     Json& images = project_["light"]["probe"]["images"];
     images = Json::array({images[2]});
-    const ProgramRun run = insert({"--strict"});
+    // And which technique was asked for, and which made the picture: 1 is a bound that fiv keeps.
+    const fs::path report = folder_ / "report.json";
+    const ProgramRun run = insert(
+        {"--strict", "--technique", "auto", "--max-error", "1", "--report", report.string()});
     EXPECT_EQ(run.exit_code, 4) << run.messages;
     EXPECT_THAT(run.messages, HasSubstr("bracket-single-exposure"));
     EXPECT_THAT(run.messages, HasSubstr("photo-response-assumed-srgb"));
+    const Json render = readJsonFile(report)["render"];
+    EXPECT_EQ(render["technique_asked"], "auto");
+    EXPECT_EQ(render["technique"], "fiv");
+    EXPECT_GT(render["fiv_error"]["pixels"].get<int>(), 0);
 }
 
 TEST_F(InsertProject, WrongUsage)
