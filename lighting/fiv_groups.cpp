@@ -95,6 +95,15 @@ Source sourceOfCorners(const SilhouetteSet& set, const CornerIrradiance& light)
     return source;
 }
 
+std::size_t placesOfGroup(std::size_t places)
+{
+    constexpr std::size_t kGroups = 16;
+    constexpr std::size_t kLeast = 16 * Block::kSize;
+    constexpr std::size_t kMost = std::size_t{Group::kBlocks} * Block::kSize;
+    const std::size_t share = places / kGroups + 1;
+    return std::clamp((share + kLeast - 1) / kLeast * kLeast, kLeast, kMost);
+}
+
 void fillBlock(Group& group,
                std::size_t index,
                std::span<const glm::vec3> places,
@@ -104,6 +113,8 @@ void fillBlock(Group& group,
     Block& block = group.blocks[index];
     glm::vec3 low = places[std::min(begin, places.size() - 1)];
     glm::vec3 high = low;
+    NormalBounds bounds;
+    if (!normals.empty()) bounds.low = bounds.high = normals[std::min(begin, places.size() - 1)];
     for (std::size_t i = 0; i < Block::kSize; ++i) {
         const std::size_t from = std::min(begin + i, places.size() - 1);
         const glm::vec3 p = places[from];
@@ -117,7 +128,13 @@ void fillBlock(Group& group,
         block.nx[i] = normals[from].x;
         block.ny[i] = normals[from].y;
         block.nz[i] = normals[from].z;
+        bounds.low = glm::min(bounds.low, normals[from]);
+        bounds.high = glm::max(bounds.high, normals[from]);
     }
+    group.normals[index] = bounds;
+    NormalBounds& all = group.all_normals;
+    if (index == 0) all = bounds;
+    all = {glm::min(all.low, bounds.low), glm::max(all.high, bounds.high)};
     std::fill(std::begin(block.uniform), std::end(block.uniform), 0.0f);
     for (auto& row : block.sums)
         std::fill(std::begin(row), std::end(row), 0.0f);

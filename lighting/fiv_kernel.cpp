@@ -3,6 +3,9 @@
 #include "core/check.h"
 #include "lighting/fiv_kernel_steps.h"
 
+#include <algorithm>
+#include <memory>
+
 namespace insitu::fiv {
 
 namespace {
@@ -21,6 +24,38 @@ INSITU_KERNEL void accumulateAll(const float* flux, Projected& p, Block& block)
     }
 }
 
+/// Whether light may fall on the front of any surface whose normal lies within the bounds.
+INSITU_KERNEL bool mayFallOn(const NormalBounds& bounds, const float* vector)
+{
+    float most = 0.0f;
+    for (int axis = 0; axis < 3; ++axis) {
+        const float low = vector[axis] * bounds.low[axis];
+        const float high = vector[axis] * bounds.high[axis];
+        most += low > high ? low : high;
+    }
+    return most > 0.0f;
+}
+
+/// Those of the sides from which light falls on surfaces.
+template <Sum kSum>
+INSITU_KERNEL std::uint32_t litSides(std::uint32_t sides,
+                                     const NormalBounds& bounds,
+                                     const float* along,
+                                     const float* against)
+{
+    constexpr int kVectors = kSum == Sum::PerPlace ? 3 : kSum == Sum::Radiance ? 1 : 0;
+    if constexpr (kVectors == 0) return sides;
+    const auto falls = [&](const float* vectors) {
+        bool any = false;
+        for (int c = 0; c < kVectors; ++c)
+            any |= mayFallOn(bounds, vectors + 3 * c);
+        return any;
+    };
+    if ((sides & kAlong) != 0 && !falls(along)) sides &= ~std::uint32_t{kAlong};
+    if ((sides & kAgainst) != 0 && !falls(against)) sides &= ~std::uint32_t{kAgainst};
+    return sides;
+}
+
 template <Sum kSum>
 INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
 {
@@ -29,20 +64,25 @@ INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
     Projected p;
     Concerns found;
     for (std::size_t direction = 0; direction < source.shines.size(); ++direction) {
-        const std::uint32_t shines = source.shines[direction];
+        const float* const along = source.along.data() + direction * kNumbers;
+        const float* const against = source.against.data() + direction * kNumbers;
+        const std::uint32_t shines =
+            litSides<kSum>(source.shines[direction], group.all_normals, along, against);
         if (shines == 0) continue;
         const Look look = lookAt(set.frames[direction], set.resolution, bias);
         concerns(look, group, shines, found);
-        for (int b = 0; b < group.count; ++b) {
-            const std::uint32_t sides = found.sides[b];
-            if ((sides & (kAlong | kAgainst)) == 0) continue;
-            const Cover cover = coverOf(set.tiles[direction], found, b);
+        const SilhouetteTiles& tiles = set.tiles[direction];
+        for (int n = 0; n < found.count; ++n) {
+            const int b = found.list[n];
+            const Cover cover = coverOf(tiles, found, b);
             if (cover == Cover::Nothing) continue;
-            Block& block = group.blocks[b];
-            const float* const along = source.along.data() + direction * kNumbers;
-            const float* const against = source.against.data() + direction * kNumbers;
+            const std::uint32_t sides =
+                litSides<kSum>(sidesOf(look, tiles, found, b), group.normals[b], along, against);
+            if ((sides & (kAlong | kAgainst)) == 0) continue;
+            Block& block = group.blocks[static_cast<std::size_t>(b)];
             if (cover == Cover::All && (sides & kDepth) == 0) {
-                accumulateAll<kSum>((sides & kAlong) != 0 ? along : against, p, block);
+                if ((sides & kAlong) != 0) accumulateAll<kSum>(along, p, block);
+                if ((sides & kAgainst) != 0) accumulateAll<kSum>(against, p, block);
                 continue;
             }
             if (!sharesOf(look, set, direction, block, sides, bias, p)) continue;
@@ -52,16 +92,17 @@ INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
     }
 }
 
-/// What several objects leave of the light of a block: multiplied by each one's shares.
+/// What several objects leave of the light of each block: multiplied by each one's shares.
 struct Left {
-    alignas(64) float along[kSize], against[kSize];
-    bool any = false;
+    bool any[Group::kBlocks];
+    alignas(64) float along[Group::kBlocks][kSize], against[Group::kBlocks][kSize];
 
-    INSITU_KERNEL void start()
+    INSITU_KERNEL void start(int b)
     {
-        any = false;
+        if (any[b]) return;
+        any[b] = true;
         for (int i = 0; i < kSize; ++i)
-            along[i] = against[i] = 1.0f;
+            along[b][i] = against[b][i] = 1.0f;
     }
     INSITU_KERNEL static void take(float* left, const float* share)
     {
@@ -75,6 +116,33 @@ struct Left {
     }
 };
 
+/// Takes from what is left of a direction's light what one of the objects hides.
+INSITU_KERNEL void takeHidden(const Occluder& occluder,
+                              std::size_t direction,
+                              const Look& look,
+                              const Concerns& found,
+                              float bias,
+                              const Group& group,
+                              Projected& p,
+                              Left& left)
+{
+    const std::size_t silhouette = occluder.silhouettes[direction];
+    const SilhouetteTiles& tiles = occluder.set->tiles[silhouette];
+    const bool swapped = occluder.swapped[direction] != 0;
+    for (int n = 0; n < found.count; ++n) {
+        const int b = found.list[n];
+        if (coverOf(tiles, found, b) == Cover::Nothing) continue;
+        const std::uint32_t sides = sidesOf(look, tiles, found, b);
+        if ((sides & (kAlong | kAgainst)) == 0) continue;
+        const Block& block = group.blocks[static_cast<std::size_t>(b)];
+        if (!sharesOf(look, *occluder.set, silhouette, block, sides, bias, p)) continue;
+        left.start(b);
+        if ((sides & kAlong) != 0) Left::take(swapped ? left.against[b] : left.along[b], p.along);
+        if ((sides & kAgainst) != 0)
+            Left::take(swapped ? left.along[b] : left.against[b], p.against);
+    }
+}
+
 template <Sum kSum>
 INSITU_KERNEL void sumUnion(const Source& light,
                             std::span<const Occluder> occluders,
@@ -83,50 +151,30 @@ INSITU_KERNEL void sumUnion(const Source& light,
 {
     constexpr auto kNumbers = static_cast<std::size_t>(fluxNumbers(kSum));
     Projected p;
-    Left left;
-    std::vector<Look> looks(occluders.size());
-    std::vector<Concerns> found(occluders.size());
+    Concerns found;
+    const auto left = std::make_unique<Left>();
     for (std::size_t direction = 0; direction < light.shines.size(); ++direction) {
-        const std::uint32_t shines = light.shines[direction];
+        const float* const along = light.along.data() + direction * kNumbers;
+        const float* const against = light.against.data() + direction * kNumbers;
+        const std::uint32_t shines =
+            litSides<kSum>(light.shines[direction], groups[0].all_normals, along, against);
         if (shines == 0) continue;
+        std::fill(std::begin(left->any), std::end(left->any), false);
         for (std::size_t k = 0; k < occluders.size(); ++k) {
             const Occluder& o = occluders[k];
-            looks[k] = lookAt(o.frames[direction], o.set->resolution, bias);
+            const Look look = lookAt(o.frames[direction], o.set->resolution, bias);
             const std::uint32_t own =
                 o.swapped[direction] != 0 ? (shines >> 1) | ((shines & 1u) << 1) : shines;
-            concerns(looks[k], groups[k], own, found[k]);
+            concerns(look, groups[k], own, found);
+            takeHidden(o, direction, look, found, bias, groups[k], p, *left);
         }
         for (int b = 0; b < groups[0].count; ++b) {
-            left.start();
-            for (std::size_t k = 0; k < occluders.size(); ++k) {
-                const Occluder& o = occluders[k];
-                const std::uint32_t concern = found[k].sides[b];
-                if ((concern & (kAlong | kAgainst)) == 0) continue;
-                if (coverOf(o.set->tiles[o.silhouettes[direction]], found[k], b) == Cover::Nothing)
-                    continue;
-                if (!sharesOf(looks[k],
-                              *o.set,
-                              o.silhouettes[direction],
-                              groups[k].blocks[b],
-                              concern,
-                              bias,
-                              p))
-                    continue;
-                const bool swapped = o.swapped[direction] != 0;
-                if ((concern & kAlong) != 0)
-                    Left::take(swapped ? left.against : left.along, p.along);
-                if ((concern & kAgainst) != 0)
-                    Left::take(swapped ? left.along : left.against, p.against);
-                left.any = true;
-            }
-            if (!left.any) continue;
-            Left::invert(left.along);
-            Left::invert(left.against);
-            Block& block = groups[0].blocks[b];
-            if ((shines & 1u) != 0)
-                accumulate<kSum>(left.along, light.along.data() + direction * kNumbers, block);
-            if ((shines & 2u) != 0)
-                accumulate<kSum>(left.against, light.against.data() + direction * kNumbers, block);
+            if (!left->any[b]) continue;
+            Left::invert(left->along[b]);
+            Left::invert(left->against[b]);
+            Block& block = groups[0].blocks[static_cast<std::size_t>(b)];
+            if ((shines & kAlong) != 0) accumulate<kSum>(left->along[b], along, block);
+            if ((shines & kAgainst) != 0) accumulate<kSum>(left->against[b], against, block);
         }
     }
 }

@@ -21,20 +21,35 @@ struct Block {
     alignas(64) Row sums[13];    ///< what comes out, channel by channel
     float uniform[13];           ///< the same for all places, to be added to the sums
 };
-/// Blocks that are summed together: their sums stay in the second cache, a silhouette in the first.
-struct Group {
-    static constexpr int kBlocks = 96;
+struct NormalBounds {
+    glm::vec3 low{0.0f}, high{0.0f};
+};
 
-    Block blocks[kBlocks];
-    int count = 0;
+/// Blocks that are summed together: their sums stay in the second cache while silhouettes pass by.
+struct Group {
+    static constexpr int kBlocks = 384;
+
+    /// Makes room for `block_count` of them, at most kBlocks.
+    void resize(std::size_t block_count)
+    {
+        count = static_cast<int>(block_count);
+        blocks.resize(filled());
+    }
     /// Blocks that must hold places: whole vectors of any instruction set.
     [[nodiscard]] std::size_t filled() const
     {
-        return (static_cast<std::size_t>(count) + 15) / 16 * 16;
+        return (static_cast<std::size_t>(count) + 31) / 32 * 32;
     }
+    int count = 0;
+    std::vector<Block> blocks;
     /// Balls around the places of each block; all of them beyond `count` are as the last.
     alignas(64) float x[kBlocks], y[kBlocks], z[kBlocks], radius[kBlocks];
+    /// Boxes around the normals of each block and of all, where there are normals.
+    NormalBounds normals[kBlocks], all_normals;
 };
+/// Places of one group when `places` are cut into groups: few enough for every thread to
+/// get some. What comes out does not depend on it.
+[[nodiscard]] std::size_t placesOfGroup(std::size_t places);
 
 /// What is summed of each direction's hidden light.
 enum class Sum {

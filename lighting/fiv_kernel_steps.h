@@ -1,9 +1,8 @@
 #pragma once
 
-#include "lighting/fiv_kernel.h"
+#include "lighting/fiv_concerns.h"
 
 #include <bit>
-#include <cmath>
 #include <cstring>
 
 /// The steps of fiv_kernel.cpp and nothing else: from a block's places to the shares that a
@@ -12,122 +11,16 @@ namespace insitu::fiv {
 
 static_assert(std::endian::native == std::endian::little, "depths are read as pairs of 16 bits");
 
-constexpr int kSize = Block::kSize;
-
 /// Places of a block in a silhouette.
 struct Projected {
     alignas(64) float column[kSize], row[kSize];  ///< parts of a texel
     alignas(64) float depth[kSize];
-    alignas(64) std::int32_t texel[kSize];
-    alignas(64) std::uint32_t upper[kSize], lower[kSize];  ///< coverage of two texels each
+    alignas(64) std::int32_t texel_column[kSize], texel_row[kSize], texel[kSize];
+    /// Coverage of the texels around each place: bytes 0 and 1 of its own row, 2 and 3 of the next.
+    alignas(64) std::uint32_t quads[kSize];
     alignas(64) std::uint32_t spans[4][kSize];
     alignas(64) float along[kSize], against[kSize];
 };
-
-/// What a silhouette means for the blocks of a group.
-struct Concerns {
-    alignas(64) std::uint32_t sides[Group::kBlocks];  ///< sets of Concern
-    /// First and last tile that the places of a block may touch.
-    alignas(64) std::int32_t left[Group::kBlocks], right[Group::kBlocks];
-    alignas(64) std::int32_t top[Group::kBlocks], bottom[Group::kBlocks];
-};
-
-/// What of a silhouette concerns a block.
-enum Concern : std::uint32_t {
-    kAlong = 1,
-    kAgainst = 2,
-    kDepth = 4,  ///< depths must be compared
-};
-
-INSITU_KERNEL float dot(const glm::vec3& axis, float x, float y, float z)
-{
-    return axis.x * x + axis.y * y + axis.z * z;
-}
-
-INSITU_KERNEL float size(const glm::vec3& axis)
-{
-    return std::sqrt(dot(axis, axis.x, axis.y, axis.z));
-}
-
-/// Frame with what all blocks need of it.
-struct Look {
-    SilhouetteFrame frame;
-    float column_size = 0.0f, row_size = 0.0f, depth_size = 0.0f;
-    float edge = 0.0f;
-    float blur = 0.0f;  ///< depth codes over which a surface's side is undecided
-    float undecided = 0.0f;
-    float tiles_a_texel = 0.0f;
-};
-
-INSITU_KERNEL Look lookAt(const SilhouetteFrame& frame, int resolution, float bias)
-{
-    Look look{frame};
-    look.column_size = size(look.frame.column_axis);
-    look.row_size = size(look.frame.row_axis);
-    look.depth_size = size(look.frame.depth_axis);
-    look.edge = static_cast<float>(resolution - 1);
-    look.tiles_a_texel = 1.0f / static_cast<float>(SilhouetteTiles::texels(resolution));
-    look.undecided = (0.5f + std::abs(bias)) * look.frame.texel_depth;
-    return look;
-}
-
-constexpr float kRounding = 2e-3f;
-
-INSITU_KERNEL std::int32_t tileOf(float texel, const Look& look)
-{
-    texel = texel < 0.0f ? 0.0f : texel;
-    texel = texel > look.edge ? look.edge : texel;
-    return static_cast<std::int32_t>(texel * look.tiles_a_texel);
-}
-
-/// How much of the part of a silhouette that a block may touch is covered.
-enum class Cover { Nothing, Part, All };
-INSITU_KERNEL Cover coverOf(const SilhouetteTiles& tiles, const Concerns& found, int b)
-{
-    const auto columns = static_cast<std::uint32_t>((2u << found.right[b]) - (1u << found.left[b]));
-    std::uint32_t full = columns;
-    std::uint32_t empty = columns;
-    for (std::int32_t y = found.top[b]; y <= found.bottom[b]; ++y) {
-        full &= tiles.full[static_cast<std::size_t>(y)];
-        empty &= tiles.empty[static_cast<std::size_t>(y)];
-    }
-    if (empty == columns) return Cover::Nothing;
-    return full == columns ? Cover::All : Cover::Part;
-}
-
-/// Which blocks of the group the silhouette can hide from the light, each a set of Concern.
-INSITU_KERNEL void concerns(const Look& look,
-                            const Group& group,
-                            std::uint32_t shines,
-                            Concerns& found)
-{
-    const SilhouetteFrame& f = look.frame;
-    const int blocks = static_cast<int>(group.filled());
-    for (int b = 0; b < blocks; ++b) {
-        const float x = group.x[b];
-        const float y = group.y[b];
-        const float z = group.z[b];
-        const float radius = group.radius[b];
-        const float column = dot(f.column_axis, x, y, z) + f.column_offset;
-        const float row = dot(f.row_axis, x, y, z) + f.row_offset;
-        const float depth = dot(f.depth_axis, x, y, z) + f.depth_offset;
-        const float across = radius * look.column_size;
-        const float down = radius * look.row_size;
-        const float deep = radius * look.depth_size;
-        const bool inside = (column + across > 0.0f) & (column - across < look.edge) &
-                            (row + down > 0.0f) & (row - down < look.edge);
-        const bool before = depth + deep <= kMinDepthCode - look.undecided;
-        const bool beyond = depth - deep >= kMaxDepthCode + look.undecided;
-        const std::uint32_t sides = (beyond ? 0u : kAlong) | (before ? 0u : kAgainst);
-        const std::uint32_t lit = inside ? sides & shines : 0u;
-        // A texel more at the end, since places lie between texels; a little more for rounding.
-        found.left[b] = tileOf(column - across - kRounding, look);
-        found.right[b] = tileOf(column + across + 1.0f + kRounding, look);
-        found.top[b] = tileOf(row - down - kRounding, look);
-        found.bottom[b] = tileOf(row + down + 1.0f + kRounding, look);
-        found.sides[b] = lit | (sides == (kAlong | kAgainst) ? std::uint32_t{kDepth} : 0u);
-    }
-}
 
 INSITU_KERNEL void project(const Look& look, const Block& block, int resolution, Projected& p)
 {
@@ -146,6 +39,8 @@ INSITU_KERNEL void project(const Look& look, const Block& block, int resolution,
         r = r < last ? r : last;
         p.column[i] = column - static_cast<float>(c);
         p.row[i] = row - static_cast<float>(r);
+        p.texel_column[i] = c;
+        p.texel_row[i] = r;
         p.texel[i] = r * resolution + c;
     }
 }
@@ -162,30 +57,97 @@ INSITU_KERNEL std::uint32_t loaded(const void* from)
     return value;
 }
 
+/// A square of 4 x 4 texels that holds all texels around a block's places; places of a picture are
+/// so close together that most blocks have one.
+struct Window {
+    static constexpr std::int32_t kSide = 4;
+
+    std::int32_t column = 0, row = 0;
+    bool holds_all = false;
+};
+
+INSITU_KERNEL Window windowOf(const Projected& p, int resolution)
+{
+    std::int32_t left = p.texel_column[0];
+    std::int32_t right = left;
+    std::int32_t top = p.texel_row[0];
+    std::int32_t bottom = top;
+    for (int i = 0; i < kSize; ++i) {
+        left = left < p.texel_column[i] ? left : p.texel_column[i];
+        right = right > p.texel_column[i] ? right : p.texel_column[i];
+        top = top < p.texel_row[i] ? top : p.texel_row[i];
+        bottom = bottom > p.texel_row[i] ? bottom : p.texel_row[i];
+    }
+    const std::int32_t last = resolution - Window::kSide;
+    return {left < last ? left : last,
+            top < last ? top : last,
+            right - left < Window::kSide - 1 && bottom - top < Window::kSide - 1};
+}
+
+/// Coverage from a window, without memory: bytes of one vector by the numbers in another.
+INSITU_KERNEL bool coverageOfWindow(const std::uint8_t* coverage,
+                                    int resolution,
+                                    const Window& window,
+                                    Projected& p)
+{
+    using Bytes = std::uint8_t __attribute__((vector_size(16)));
+    using Words = std::uint32_t __attribute__((vector_size(16)));
+    Words rows;
+    for (std::int32_t y = 0; y < Window::kSide; ++y) {
+        std::uint32_t row;
+        std::memcpy(&row, coverage + (window.row + y) * resolution + window.column, sizeof(row));
+        rows[y] = row;
+    }
+    if ((rows[0] | rows[1] | rows[2] | rows[3]) == 0) return false;
+    alignas(64) std::uint32_t control[kSize];
+    for (int i = 0; i < kSize; ++i) {
+        const std::int32_t first =
+            (p.texel_row[i] - window.row) * Window::kSide + p.texel_column[i] - window.column;
+        control[i] = static_cast<std::uint32_t>(first) * 0x01010101u + 0x05040100u;
+    }
+    for (int i = 0; i < kSize; i += 4) {
+        Bytes wanted;
+        std::memcpy(&wanted, control + i, sizeof(wanted));
+        const Bytes quads = __builtin_shuffle(reinterpret_cast<Bytes>(rows), wanted);
+        std::memcpy(p.quads + i, &quads, sizeof(quads));
+    }
+    return true;
+}
+
 /// False when nothing covers any of the texels around the places.
 INSITU_KERNEL bool loadCoverage(const std::uint8_t* coverage, int resolution, Projected& p)
 {
+    if (const Window window = windowOf(p, resolution); window.holds_all)
+        return coverageOfWindow(coverage, resolution, window, p);
     std::uint32_t any = 0;
     for (int i = 0; i < kSize; ++i) {
-        const std::uint32_t upper = loaded<std::uint16_t>(coverage + p.texel[i]);
-        const std::uint32_t lower = loaded<std::uint16_t>(coverage + p.texel[i] + resolution);
-        p.upper[i] = upper;
-        p.lower[i] = lower;
-        any |= upper | lower;
+        const std::uint8_t* const texel = coverage + p.texel[i];
+        const std::uint32_t quad =
+            loaded<std::uint16_t>(texel) | loaded<std::uint16_t>(texel + resolution) << 16;
+        p.quads[i] = quad;
+        any |= quad;
     }
     return any != 0;
 }
 
-INSITU_KERNEL void shareOfCoverage(Projected& p, float* share)
+/// Coverage of one of the four texels around a place, [0, 255].
+INSITU_KERNEL float covered(std::uint32_t quad, int corner)
+{
+    return static_cast<float>(static_cast<std::int32_t>(quad >> (8 * corner) & 255u));
+}
+
+/// Shares of both directions, whatever the depth.
+INSITU_KERNEL void shareOfCoverage(Projected& p)
 {
     for (int i = 0; i < kSize; ++i) {
-        const auto a = static_cast<float>(static_cast<std::int32_t>(p.upper[i] & 255u));
-        const auto b = static_cast<float>(static_cast<std::int32_t>(p.upper[i] >> 8));
-        const auto c = static_cast<float>(static_cast<std::int32_t>(p.lower[i] & 255u));
-        const auto d = static_cast<float>(static_cast<std::int32_t>(p.lower[i] >> 8));
+        const std::uint32_t quad = p.quads[i];
+        const float a = covered(quad, 0);
+        const float b = covered(quad, 1);
+        const float c = covered(quad, 2);
+        const float d = covered(quad, 3);
         const float upper = a + p.column[i] * (b - a);
         const float lower = c + p.column[i] * (d - c);
-        share[i] = (upper + p.row[i] * (lower - upper)) * (1.0f / 255.0f);
+        p.along[i] = p.against[i] = (upper + p.row[i] * (lower - upper)) * (1.0f / 255.0f);
     }
 }
 
@@ -222,16 +184,13 @@ INSITU_KERNEL void sharesByDepth(const Look& look, float bias, Projected& p)
         const float depth = p.depth[i];
         const float weights[4] = {
             (1.0f - tx) * (1.0f - ty), tx * (1.0f - ty), (1.0f - tx) * ty, tx * ty};
-        const std::uint32_t covers[4] = {
-            p.upper[i] & 255u, p.upper[i] >> 8, p.lower[i] & 255u, p.lower[i] >> 8};
         float along = 0.0f;
         float against = 0.0f;
         for (int k = 0; k < 4; ++k) {
             const auto near =
                 static_cast<float>(static_cast<std::int32_t>(p.spans[k][i] & 0xffffu));
             const auto far = static_cast<float>(static_cast<std::int32_t>(p.spans[k][i] >> 16));
-            const float weight =
-                weights[k] * static_cast<float>(static_cast<std::int32_t>(covers[k]));
+            const float weight = weights[k] * covered(p.quads[i], k);
             along += weight * clampToUnit(middle + (far - depth) * sharpness);
             against += weight * clampToUnit(middle + (depth - near) * sharpness);
         }
@@ -286,7 +245,7 @@ INSITU_KERNEL bool sharesOf(const Look& look,
         loadDepths(look, block, set.depthsOf(silhouette), set.resolution, p);
         sharesByDepth(look, bias, p);
     } else {
-        shareOfCoverage(p, (concern & kAlong) != 0 ? p.along : p.against);
+        shareOfCoverage(p);
     }
     return true;
 }

@@ -35,13 +35,13 @@ void sumHidden(const std::vector<Source>& sources,
                float bias_texels,
                const Take& take)
 {
-    constexpr std::size_t kPlaces = std::size_t{Group::kBlocks} * Block::kSize;
-    const std::size_t groups = (places.size() + kPlaces - 1) / kPlaces;
+    const std::size_t group_places = fiv::placesOfGroup(places.size());
+    const std::size_t groups = (places.size() + group_places - 1) / group_places;
     parallelFor(0, static_cast<std::int64_t>(groups), [&](std::int64_t task) {
-        const std::size_t begin = static_cast<std::size_t>(task) * kPlaces;
-        const std::size_t end = std::min(begin + kPlaces, places.size());
+        const std::size_t begin = static_cast<std::size_t>(task) * group_places;
+        const std::size_t end = std::min(begin + group_places, places.size());
         const auto group = std::make_unique<Group>();
-        group->count = static_cast<int>((end - begin + Block::kSize - 1) / Block::kSize);
+        group->resize((end - begin + Block::kSize - 1) / Block::kSize);
         for (std::size_t b = 0; b < group->filled(); ++b)
             fiv::fillBlock(*group, b, places, normals, begin + b * Block::kSize);
         for (const Source& source : sources)

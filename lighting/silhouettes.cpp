@@ -21,6 +21,36 @@ bool isFinite(glm::vec3 v)
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+SilhouetteTiles tilesOf(const std::uint8_t* coverage, const DepthSpan* depths, int resolution)
+{
+    const int side = SilhouetteTiles::texels(resolution);
+    SilhouetteTiles tiles;
+    std::array<std::uint16_t, SilhouetteTiles::kSide> partly{}, touched{};
+    std::size_t texel = 0;
+    for (int y = 0; y < resolution; ++y)
+        for (int x = 0; x < resolution; ++x, ++texel) {
+            const auto row = static_cast<std::size_t>(y / side);
+            const auto bit = static_cast<std::uint16_t>(1u << (x / side));
+            if (coverage[texel] != 255) partly[row] = static_cast<std::uint16_t>(partly[row] | bit);
+            if (coverage[texel] == 0) continue;
+            touched[row] = static_cast<std::uint16_t>(touched[row] | bit);
+            const auto near = static_cast<std::uint8_t>(depths[texel].near >> 8);
+            const auto far = static_cast<std::uint8_t>(depths[texel].far >> 8);
+            tiles
+                .depths[row / 2 * (SilhouetteTiles::kSide / 2) +
+                        static_cast<std::size_t>(x / side / 2)]
+                .add({near,
+                      static_cast<std::uint8_t>(255 - near),
+                      far,
+                      static_cast<std::uint8_t>(255 - far)});
+        }
+    for (std::size_t row = 0; row < SilhouetteTiles::kSide; ++row) {
+        tiles.full[row] = static_cast<std::uint16_t>(~partly[row]);
+        tiles.empty[row] = static_cast<std::uint16_t>(~touched[row]);
+    }
+    return tiles;
+}
+
 }  // namespace
 
 LocalFrame localFrame(const TriangleMesh& mesh)
@@ -59,22 +89,9 @@ std::size_t SilhouetteSet::memoryBytes() const
 void SilhouetteSet::summarize()
 {
     tiles.assign(frames.size(), {});
-    const int side = SilhouetteTiles::texels(resolution);
     parallelFor(0, static_cast<std::int64_t>(frames.size()), [&](std::int64_t task) {
         const auto i = static_cast<std::size_t>(task);
-        const std::uint8_t* texel = coverageOf(i);
-        std::array<std::uint16_t, SilhouetteTiles::kSide> partly{}, touched{};
-        for (int y = 0; y < resolution; ++y)
-            for (int x = 0; x < resolution; ++x, ++texel) {
-                const auto row = static_cast<std::size_t>(y / side);
-                const auto bit = static_cast<std::uint16_t>(1u << (x / side));
-                if (*texel != 255) partly[row] = static_cast<std::uint16_t>(partly[row] | bit);
-                if (*texel != 0) touched[row] = static_cast<std::uint16_t>(touched[row] | bit);
-            }
-        for (std::size_t row = 0; row < SilhouetteTiles::kSide; ++row) {
-            tiles[i].full[row] = static_cast<std::uint16_t>(~partly[row]);
-            tiles[i].empty[row] = static_cast<std::uint16_t>(~touched[row]);
-        }
+        tiles[i] = tilesOf(coverageOf(i), depthsOf(i), resolution);
     });
 }
 

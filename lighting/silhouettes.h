@@ -5,6 +5,7 @@
 
 #include <glm/glm.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -51,14 +52,46 @@ struct DepthSpan {
 inline constexpr float kMinDepthCode = 1.0f;
 inline constexpr float kMaxDepthCode = 65534.0f;
 
-/// Which parts of a silhouette are wholly covered and which wholly empty: most places fall into
-/// neither's neighbourhood and need no texel looked at. 16 x 16 tiles, bit x of row y.
+/// Which parts of a silhouette are wholly covered and which wholly empty, and between which depths
+/// its surfaces lie: most places fall into neither's neighbourhood, or are on one side of all
+/// surfaces there, and need no texel looked at.
 struct SilhouetteTiles {
     static constexpr int kSide = 16;
 
-    std::array<std::uint16_t, kSide> full{}, empty{};
+    std::array<std::uint16_t, kSide> full{}, empty{};  ///< 16 x 16 tiles, bit x of row y
     /// Texels along a tile's side.
     [[nodiscard]] static int texels(int resolution) { return (resolution + kSide - 1) / kSide; }
+
+    /// Bounds of the depths in 2 x 2 tiles, in 1/256 of all codes, as numbers that are larger the
+    /// wider the bounds.
+    struct Depths {
+        std::uint8_t near_most = 0, near_least = 0;  ///< the lesser ones are 255 less the bound
+        std::uint8_t far_most = 0, far_least = 0;
+
+        void add(const Depths& other)
+        {
+            near_most = std::max(near_most, other.near_most);
+            near_least = std::max(near_least, other.near_least);
+            far_most = std::max(far_most, other.far_most);
+            far_least = std::max(far_least, other.far_least);
+        }
+        /// In depth codes; above all and below all when nothing was added.
+        [[nodiscard]] float nearMost() const { return 256.0f * static_cast<float>(near_most + 1); }
+        [[nodiscard]] float nearLeast() const
+        {
+            return 256.0f * static_cast<float>(255 - near_least);
+        }
+        [[nodiscard]] float farMost() const { return 256.0f * static_cast<float>(far_most + 1); }
+        [[nodiscard]] float farLeast() const
+        {
+            return 256.0f * static_cast<float>(255 - far_least);
+        }
+    };
+    std::array<Depths, kSide / 2 * kSide / 2> depths{};
+    [[nodiscard]] const Depths& depthsAt(int x, int y) const
+    {
+        return depths[static_cast<std::size_t>(y * (kSide / 2) + x)];
+    }
 };
 
 /// Orthographic silhouettes of one object along several directions.
@@ -75,9 +108,9 @@ struct SilhouetteSet {
     /// resolution² a direction, row by row: share of the texel that the object covers, 255 is all.
     std::vector<std::uint8_t> coverage;
     std::vector<DepthSpan> depths;
-    std::vector<SilhouetteTiles> tiles;  ///< one a direction, from the coverage
+    std::vector<SilhouetteTiles> tiles;  ///< one a direction, from coverage and depths
 
-    /// Makes the tiles from the coverage.
+    /// Makes the tiles.
     void summarize();
     [[nodiscard]] std::size_t texels() const
     {

@@ -101,18 +101,18 @@ void ObjectStage::Impl::sum(Sum kind,
 {
     const Source of_cells = fiv::sourceOf(nullptr, light.along, light.against, kind, normal);
     const Source of_fine = fiv::sourceOf(nullptr, light.fine, {}, kind, normal);
-    constexpr std::size_t kPlaces = std::size_t{Group::kBlocks} * Block::kSize;
-    const std::size_t tasks = (places.size() + kPlaces - 1) / kPlaces;
+    const std::size_t group_places = fiv::placesOfGroup(places.size());
+    const std::size_t tasks = (places.size() + group_places - 1) / group_places;
     parallelFor(0, static_cast<std::int64_t>(tasks), [&](std::int64_t task) {
-        const std::size_t begin = static_cast<std::size_t>(task) * kPlaces;
-        const std::size_t count = std::min(kPlaces, places.size() - begin);
+        const std::size_t begin = static_cast<std::size_t>(task) * group_places;
+        const std::size_t count = std::min(group_places, places.size() - begin);
         std::vector<Group> groups(objects.size());
         std::vector<glm::vec3> local(count);
         const auto own_normals = normals.empty() ? normals : normals.subspan(begin, count);
         for (std::size_t k = 0; k < objects.size(); ++k) {
             for (std::size_t i = 0; i < count; ++i)
                 local[i] = localFrom(objects[k], places[begin + i]);
-            groups[k].count = static_cast<int>((count + Block::kSize - 1) / Block::kSize);
+            groups[k].resize((count + Block::kSize - 1) / Block::kSize);
             for (std::size_t b = 0; b < groups[k].filled(); ++b)
                 fiv::fillBlock(groups[k], b, local, own_normals, b * Block::kSize);
         }

@@ -127,9 +127,10 @@ TEST(HiddenLight, EveryInstructionSetAndThreadCountGivesTheSameBytes)
     source.shines.assign(object.light.along.size(), 3);
     const auto sums = [&](fiv::Isa isa) {
         const auto group = std::make_unique<fiv::Group>();
-        std::memset(static_cast<void*>(group.get()), 0, sizeof(*group));
-        group->count = fiv::Group::kBlocks;
-        for (std::size_t b = 0; b < fiv::Group::kBlocks; ++b) {
+        group->resize(96);
+        for (std::size_t b = 0; b < group->blocks.size(); ++b) {
+            std::memset(static_cast<void*>(&group->blocks[b]), 0, sizeof(fiv::Block));
+            group->x[b] = group->y[b] = group->z[b] = 0.0f;
             group->radius[b] = 10.0f;
             for (std::size_t i = 0; i < fiv::Block::kSize; ++i) {
                 const glm::vec3 p = places[b * fiv::Block::kSize + i];
