@@ -130,7 +130,7 @@ Composite compositeInOwnPrimaries(const EncodedImage& photo,
     composite.influence = Image<std::uint8_t>(width, height);
     Image<Rgb> radiance = photographedRadiance(photo, response, relative_exposure);
     const std::size_t clipped = restoreClipped(photo, layers.probe_radiance, clip_code, radiance);
-    const PhotoNoise noise(match.grain, response, relative_exposure);
+    const PhotoNoise noise(match.grain, response, relative_exposure, photo.max_code);
     const Image<Rgb> reflectance = reflectanceOverPi(photo, radiance, layers, options, noise);
 
     std::atomic<std::size_t> changed{0};
@@ -269,6 +269,28 @@ Composite compositeDifferential(const EncodedImage& photo,
         compositeInOwnPrimaries(photo, response, relative_exposure, own, options, match);
     (void)convertPixels(composite.linear, rec709_from_linear);
     return composite;
+}
+
+Image<Rgb> radianceOfComposite(const Photo& photo, const Composite& composite)
+{
+    INSITU_CHECK(photo.radiance.sameSize(composite.linear),
+                 "{}x{} and {}x{}",
+                 photo.radiance.width(),
+                 photo.radiance.height(),
+                 composite.linear.width(),
+                 composite.linear.height());
+    const ResponseCurve& curve = photo.metadata.color.transfer;
+    const int max_code = composite.image.max_code;
+    Image<Rgb> radiance = photo.radiance;
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
+        if (composite.influence.pixels()[i] == 0) continue;
+        const glm::u16vec3 code = composite.image.codes.pixels()[i];
+        for (int c = 0; c < 3; ++c)
+            radiance.pixels()[i][c] =
+                code[c] < max_code ? static_cast<float>(curve.decode(c, code[c] * 255.0 / max_code))
+                                   : composite.linear.pixels()[i][c];
+    }
+    return radiance;
 }
 
 }  // namespace insitu

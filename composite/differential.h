@@ -54,6 +54,11 @@ struct Composite {
                                               double relative_exposure,
                                               const glm::dmat3& rec709_from_linear = glm::dmat3(1));
 
+/// What the composite makes of an HDR photograph (photoFromRadiance): its own values, bit for bit,
+/// where nothing changed; elsewhere those of the composite's codes, grain included, or, beyond the
+/// largest code, its linear values.
+[[nodiscard]] Image<Rgb> radianceOfComposite(const Photo& photo, const Composite& composite);
+
 /// Puts the rendered layers onto the photograph.
 ///
 /// For each pixel, with E the receiver's irradiance and ρ = min(π L_photo / E_without, max),

@@ -42,7 +42,16 @@ struct PhotoMetadata {
 struct Photo {
     EncodedImage image;
     PhotoMetadata metadata;
+    /// The values of an HDR photograph, finite and >= 0; empty when the file holds codes. `image`
+    /// is then a copy of them, see photoFromRadiance().
+    Image<Rgb> radiance;
 };
+
+/// An HDR photograph, with codes for all that works on pictures: 16 bit, by one curve for all
+/// channels (`metadata.color`, "linear"), which is linear up to a hundredth of the median and
+/// logarithmic above it, and which leaves no value clipped. A code decodes to its value within
+/// 3e-4 of it, or of a hundredth of the median where it is smaller.
+[[nodiscard]] Photo photoFromRadiance(Image<Rgb> radiance);
 
 /// What has to be told of a photograph as read: "photo-profile" (Info) when its colours are those
 /// of a profile other than sRGB, "photo-profile-unusable" (Warning) when the embedded one cannot be

@@ -210,7 +210,7 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     InsertResult result;
     Project project = given;
     Stopwatch watch(result.times);
-    result.photo = developed(readPhoto(project.photo.path));
+    result.photo = readPhotograph(project.photo.path);
     append(result.findings,
            photoFindings(result.photo.metadata, project.photo.path.filename().string()));
     result.camera = solveCamera(project, result.photo, options.use_exif_focal);
@@ -259,6 +259,8 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
                                              options.composite,
                                              primaries,
                                              result.match.match);
+    if (!result.photo.radiance.empty())
+        result.composite.linear = radianceOfComposite(result.photo, result.composite);
     append(result.findings, result.composite.findings);
     append(result.findings, cache.findings());
     watch.lap("composite");

@@ -144,6 +144,12 @@ void choosePhotoBalance(const ProjectWhiteBalance& wanted, bool unit_known, Phot
                  "photo-white-balance-doubtful",
                  "photograph and light probe see no surface in common: exposure and white "
                  "balance cannot be solved; give \"white_balance\" as three numbers"});
+        else if (!unit_known)
+            balance.findings.push_back(
+                {Severity::Warning,
+                 "light-scale-assumed",
+                 "photograph and light share no known unit, and no surface that both see tells "
+                 "their scale: it is taken to be 1; give \"white_balance\" as three numbers"});
         return;
     }
     const ColorJudgement color = judgeColor(balance);
@@ -177,8 +183,8 @@ void choosePhotoBalance(const ProjectWhiteBalance& wanted, bool unit_known, Phot
         balance.findings.push_back(
             {Severity::Info,
              "light-scale-from-photograph",
-             fmt::format("the light's exposure is unknown; scaled by {:.4g} so that surfaces "
-                         "seen by both agree (spread {:.0f} %)",
+             fmt::format("photograph and light share no known unit; the light is scaled by {:.4g} "
+                         "so that surfaces seen by both agree (spread {:.0f} %)",
                          balance.luminance,
                          100.0 * balance.luminance_spread)});
     } else if (std::abs(std::log(balance.luminance)) > kExposureOff) {

@@ -42,13 +42,14 @@ struct PhotoBalance {
                                                const EnvironmentMap& probe,
                                                glm::dvec3 probe_center_m);
 
-/// Decides what is used. None: 1, or, when the probe's exposures are unknown (`unit_known` false),
-/// what was measured in luminance. Given: the numbers. Solved: all that was measured. Auto: all
-/// that was measured when the colour (over green, which cameras hardly amplify) is off by more than
-/// 5 % and by more than three of its standard deviations: then EXIF does not tell how much light
-/// each channel got. Else as None.
+/// Decides what is used. None: 1, or, when photograph and probe share no known unit (`unit_known`
+/// false), what was measured in luminance. Given: the numbers. Solved: all that was measured. Auto:
+/// all that was measured when the colour (over green, which cameras hardly amplify) is off by more
+/// than 5 % and by more than three of its standard deviations: then EXIF does not tell how much
+/// light each channel got. Else as None.
 ///
-/// Findings: "light-scale-from-photograph" (exposures unknown), "light-photo-mismatch" (luminance
+/// Findings: "light-scale-from-photograph" and, where no surface tells it, "light-scale-assumed"
+/// (no known unit), "light-photo-mismatch" (luminance
 /// off by more than 25 % though exposures are known, and not solved), "photo-white-balance-solved"
 /// (gains, residual), "photo-white-balance-doubtful" (off, but the surfaces disagree by too much to
 /// solve it, or nothing is seen by both though it was asked for).

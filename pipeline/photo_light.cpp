@@ -35,6 +35,15 @@ ResponseCurve scaledAtMiddle(ResponseCurve curve)
 void choosePhotoResponse(const Project& project, InsertResult& result)
 {
     const PhotoMetadata& photo = result.photo.metadata;
+    if (!result.photo.radiance.empty()) {
+        const Exposure& given = project.photo.exposure;
+        if (given.seconds || given.f_number || given.iso)
+            throw InputError(project.photo.path.string(),
+                             "holds radiance, not codes of an exposure: leave exposure_seconds, "
+                             "f_number and iso out of \"photo\"");
+        result.photo_response = photo.color.transfer;
+        return;
+    }
     const PhotoMetadata& probe = result.light.metadata;
     const Exposure exposure = merged(photo.exposure, project.photo.exposure);
     const bool same_camera = photo.make == probe.make && photo.model == probe.model;
@@ -78,8 +87,12 @@ PhotoLight photoLight(const Project& project,
                       InsertResult& result)
 {
     PhotoLight light;
-    light.taken = photographedRadiance(
-        result.photo.image, result.photo_response, result.photo_relative_exposure, primaries);
+    light.taken = !result.photo.radiance.empty()
+                      ? result.photo.radiance
+                      : photographedRadiance(result.photo.image,
+                                             result.photo_response,
+                                             result.photo_relative_exposure,
+                                             primaries);
     glm::dvec3 clip;
     for (std::size_t c = 0; c < 3; ++c)
         clip[static_cast<int>(c)] =
@@ -87,9 +100,11 @@ PhotoLight photoLight(const Project& project,
     const Camera& camera = result.camera.camera;
     result.balance = measurePhotoBalance(
         light.taken, clip, camera, proxy, result.light.environment, result.light.center_m);
-    choosePhotoBalance(project.white_balance, result.light.radiance_unit_known, result.balance);
+    // An HDR photograph may be in any unit.
+    const bool same_unit = result.light.radiance_unit_known && result.photo.radiance.empty();
+    choosePhotoBalance(project.white_balance, same_unit, result.balance);
     append(result.findings, std::move(result.balance.findings));
-    if (!result.light.radiance_unit_known) return light;
+    if (!same_unit && (result.photo.radiance.empty() || result.balance.pixels == 0)) return light;
     light.in_probe_unit = {camera, light.taken};
     if (result.balance.used != glm::dvec3(1.0))
         for (Rgb& value : light.in_probe_unit->radiance.pixels())

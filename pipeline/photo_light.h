@@ -14,9 +14,10 @@ namespace insitu {
 // What insertObjects and projectRadianceMesh share of the photograph: each reads what the stages
 // before it left in `result` and adds its findings to it.
 
-/// The photograph is a single exposure: its response is the probe's when one camera took both.
+/// The photograph is a single exposure: its response is the probe's when one camera took both. Or
+/// it holds radiance, in a unit of its own.
 /// Findings: "photo-response-assumed-srgb". InputError: no exposure time where the probe's is
-/// known.
+/// known, or one of an HDR photograph.
 void choosePhotoResponse(const Project& project, InsertResult& result);
 
 /// The photograph's light, and the same in the light probe's exposure and white balance for the

@@ -13,7 +13,7 @@ ProjectRadianceMesh projectRadianceMesh(const Project& given,
 {
     InsertResult result;
     Project project = given;
-    result.photo = developed(readPhoto(project.photo.path));
+    result.photo = readPhotograph(project.photo.path);
     append(result.findings,
            photoFindings(result.photo.metadata, project.photo.path.filename().string()));
     result.camera = solveCamera(project, result.photo, options.use_exif_focal);

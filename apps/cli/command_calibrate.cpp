@@ -169,7 +169,7 @@ void runCalibrate(const CalibrateArguments& arguments, Context& context)
     std::optional<Photo> photo;
     std::vector<std::uint8_t> bytes;
     if (!arguments.photo.empty()) {
-        photo = developed(readPhoto(arguments.photo));
+        photo = readPhotograph(arguments.photo);
         bytes = readFile(arguments.photo, kMaxEncodedBytes);
     }
     const Calibrated found = calibrate(arguments, photo);

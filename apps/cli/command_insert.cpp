@@ -23,7 +23,6 @@ struct InsertArguments {
     std::vector<std::string> unmatched;
     bool ignore_exif_focal = false;
     bool no_cache = false;
-    int bits = 0;
     InsertOptions options;
 };
 
@@ -39,15 +38,35 @@ Image<float> changedPixels(const InsertResult& result)
     return changed;
 }
 
-void writeTonemapped(const InsertArguments& arguments,
+void writeTonemapped(const std::filesystem::path& path,
+                     const InsertArguments& arguments,
                      const CLI::App& command,
                      const InsertResult& result,
                      Context& context)
 {
     const auto tone_map = arguments.tone.make(command, changedPixels(result));
-    writeEncoded(arguments.tonemapped,
-                 encodeSrgb(tone_map->map(result.composite.linear, context.progress()),
-                            result.composite.image.max_code));
+    // Codes of an HDR photograph are no picture's depth.
+    const int max_code = result.photo.radiance.empty() ? result.composite.image.max_code : 255;
+    writeEncoded(path,
+                 encodeSrgb(tone_map->map(result.composite.linear, context.progress()), max_code));
+}
+
+/// The composite as its name says: radiance, the photograph's own kind of picture, or, of an HDR
+/// photograph, a view of it.
+void writePicture(const InsertArguments& arguments,
+                  const CLI::App& command,
+                  const InsertResult& result,
+                  Context& context)
+{
+    constexpr int kJpegQuality = 97;
+    const PhotoMetadata& metadata = result.photo.metadata;
+    if (isRadianceFile(arguments.output))
+        writeRadiance(arguments.output, result.composite.linear);
+    else if (!result.photo.radiance.empty())
+        writeTonemapped(arguments.output, arguments, command, result, context);
+    else
+        writeEncoded(
+            arguments.output, result.composite.image, metadata.exif, kJpegQuality, metadata.icc);
 }
 
 void runInsert(InsertArguments& arguments, const CLI::App& command, Context& context)
@@ -77,18 +96,18 @@ void runInsert(InsertArguments& arguments, const CLI::App& command, Context& con
     else if (options.cache_folder.empty())
         options.cache_folder = StageCache::userFolder().value_or("");
 
-    // Wrong flags are told before the work, not after it.
-    if (!arguments.tonemapped.empty()) (void)arguments.tone.make(command);
     const Project project = readProject(arguments.project);
+    // Wrong flags are told before the work, not after it.
+    const bool view_of_radiance =
+        isRadianceFile(project.photo.path) && !isRadianceFile(arguments.output);
+    if (!arguments.tonemapped.empty() || view_of_radiance) (void)arguments.tone.make(command);
     const InsertResult result = insertObjects(project, options, context.progress());
     context.print(result.findings);
 
-    constexpr int kJpegQuality = 97;
-    const PhotoMetadata& metadata = result.photo.metadata;
-    writeEncoded(
-        arguments.output, result.composite.image, metadata.exif, kJpegQuality, metadata.icc);
+    writePicture(arguments, command, result, context);
     if (!arguments.hdr.empty()) writeRadiance(arguments.hdr, result.composite.linear);
-    if (!arguments.tonemapped.empty()) writeTonemapped(arguments, command, result, context);
+    if (!arguments.tonemapped.empty())
+        writeTonemapped(arguments.tonemapped, arguments, command, result, context);
     if (!arguments.layers.empty()) writeLayers(arguments.layers, result);
     if (!arguments.report.empty())
         writeReport(arguments.report, project, options, result, arguments.output);
@@ -103,7 +122,11 @@ void registerInsert(CLI::App& app, Context& context)
     CLI::App* command =
         app.add_subcommand("insert", "Put furniture into a photograph: the whole chain");
     command->add_option("project", arguments->project, "Project file (.json)")->required();
-    command->add_option("-o,--output", arguments->output, "Picture to write (.png, .jpg)")
+    command
+        ->add_option("-o,--output",
+                     arguments->output,
+                     "Picture to write: .png or .jpg (of an HDR photograph by the tone mapping "
+                     "flags), or the linear composite (.exr, .hdr)")
         ->required();
     command->add_option("--hdr", arguments->hdr, "Also write the linear composite (.exr, .hdr)");
     command->add_option("--tonemapped",
@@ -172,7 +195,9 @@ void registerInsert(CLI::App& app, Context& context)
         "  insitu insert project.json -o final.png --technique auto --max-error 0.03\n"
         "  insitu insert project.json -o final.png --hdr final.exr --report report.json "
         "--max-error 0.002\n"
-        "  insitu insert project.json -o final.png --tonemapped view.png --operator ashikhmin");
+        "  insitu insert project.json -o final.png --tonemapped view.png --operator ashikhmin\n"
+        "A photograph may be an .exr or .hdr picture: then final.exr keeps every value that the\n"
+        "objects do not change, and final.png is a view of it.");
     command->callback([arguments, command, &context] { runInsert(*arguments, *command, context); });
 }
 

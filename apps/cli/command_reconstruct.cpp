@@ -89,7 +89,7 @@ void runReconstruct(const ReconstructArguments& arguments, Context& context)
     } else {
         const Project project = readProject(arguments.project);
         if (photo_file.empty()) photo_file = project.photo.path;
-        calibrated = solveCamera(project, developed(readPhoto(project.photo.path)), true);
+        calibrated = solveCamera(project, readPhotograph(project.photo.path), true);
         context.print(calibrated.findings);
     }
     const Camera& camera = calibrated.camera;
@@ -99,7 +99,7 @@ void runReconstruct(const ReconstructArguments& arguments, Context& context)
     const SceneEstimate estimate = solver.estimate(errorCameras(calibrated));
     context.print(estimate.findings);
     if (!arguments.overlay.empty()) {
-        const Photo photo = developed(readPhoto(photo_file));
+        const Photo photo = readPhotograph(photo_file);
         if (photo.image.codes.width() != camera.width ||
             photo.image.codes.height() != camera.height)
             throw InputError(

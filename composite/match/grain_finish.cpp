@@ -20,7 +20,7 @@ double PhotoNoise::radianceVariance(int channel, double code) const
     const double rise = slope(channel, code);
     if (!(rise > 0.0)) return 0.0;
     const double sigma = codeSigma(channel, code);
-    return (sigma * sigma + kRoundingVariance) / (rise * rise);
+    return (sigma * sigma + kRoundingVariance * code_step_ * code_step_) / (rise * rise);
 }
 
 GrainFinisher::GrainFinisher(const CameraMatch& match,

@@ -10,8 +10,14 @@ namespace insitu {
 /// The noise of a photograph in its codes and in radiance; private to this module.
 class PhotoNoise {
 public:
-    PhotoNoise(const GrainModel& grain, const ResponseCurve& response, double relative_exposure)
-        : grain_(grain), response_(response), relative_exposure_(relative_exposure)
+    PhotoNoise(const GrainModel& grain,
+               const ResponseCurve& response,
+               double relative_exposure,
+               int max_code)
+        : grain_(grain),
+          response_(response),
+          relative_exposure_(relative_exposure),
+          code_step_(255.0 / max_code)
     {
     }
     /// 8-bit code, fractional, of a radiance.
@@ -33,6 +39,7 @@ private:
     const GrainModel& grain_;
     const ResponseCurve& response_;
     double relative_exposure_;
+    double code_step_;  ///< of the photograph, in 8-bit codes
 };
 
 /// One channel of a changed pixel: radiances, and the variance of the renderer's own noise.

@@ -28,6 +28,10 @@ inline constexpr std::int64_t kMaxEncodedBytes = 1LL << 30;
 /// codes of the sensor's channels, see core/io/raw_read.h.
 [[nodiscard]] Photo readPhoto(const std::filesystem::path& path,
                               std::int64_t max_pixels = kMaxPixels);
+/// The photograph of a room: `readPhoto`, developed, or, of a radiance file, `readRadiance` with
+/// codes (photoFromRadiance).
+[[nodiscard]] Photo readPhotograph(const std::filesystem::path& path,
+                                   std::int64_t max_pixels = kMaxPixels);
 /// EXR, Radiance .hdr/.pic, PFM: scene-linear. A negative value becomes 0; NaN or infinity is an
 /// InputError with its pixel.
 ///

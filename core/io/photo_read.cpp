@@ -172,4 +172,10 @@ Photo readPhoto(const std::filesystem::path& path, std::int64_t max_pixels)
     return photo;
 }
 
+Photo readPhotograph(const std::filesystem::path& path, std::int64_t max_pixels)
+{
+    if (isRadianceFile(path)) return photoFromRadiance(readRadiance(path, max_pixels).pixels);
+    return developed(readPhoto(path, max_pixels));
+}
+
 }  // namespace insitu

@@ -3,6 +3,8 @@
 #include "core/color.h"
 #include "core/io/image_io.h"
 #include "core/parallel.h"
+#include "tests/support/errors.h"
+#include "tests/support/temporary_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -80,6 +82,54 @@ TEST(InsertObjects, SimulatedRoomComesCloseToTheTruePhotograph)
     EXPECT_NEAR(result.balance.luminance, 1.0, 0.15);
     EXPECT_EQ(result.balance.used, glm::dvec3(1.0));
     EXPECT_FALSE(hasFinding(result.findings, "light-photo-mismatch"));
+}
+
+// The same room photographed as radiance, in a unit of its own: the picture is the same light.
+TEST(InsertObjects, AnHdrPhotographGivesTheSameAndKeepsItsOwnValues)
+{
+    Project project = readProject(kSample / "project.json");
+    InsertOptions options = quick();
+    const TemporaryFolder folder;
+    options.render.technique = Technique::Fiv;
+    options.render.fiv.atlas_folder = folder.path();
+    leaveOut("all", options.match);
+    Progress progress;
+    const InsertResult encoded = insertObjects(project, options, progress);
+
+    constexpr float kUnit = 1e-3f;
+    Image<Rgb> radiance = photographedRadiance(
+        encoded.photo.image, encoded.photo_response, encoded.photo_relative_exposure);
+    for (Rgb& value : radiance.pixels())
+        value *= kUnit;
+    project.photo.path = folder / "plate.exr";
+    writeRadiance(project.photo.path, radiance);
+    const InsertResult result = insertObjects(project, options, progress);
+    EXPECT_TRUE(hasFinding(result.findings, "light-scale-from-photograph"));
+    EXPECT_EQ(result.photo_response.source, "linear");
+    // Surfaces seen by both tell the unit.
+    EXPECT_NEAR(result.balance.used.g, kUnit * encoded.balance.luminance, 1e-3 * kUnit);
+
+    double off = 0.0;
+    double change = 0.0;
+    const double scale = encoded.balance.luminance;
+    for (std::size_t i = 0; i < radiance.pixelCount(); ++i) {
+        if (result.composite.influence.pixels()[i] == 0) {
+            ASSERT_EQ(result.composite.linear.pixels()[i], radiance.pixels()[i]) << i;
+        }
+        if (encoded.composite.influence.pixels()[i] == 0) continue;
+        const double before = radiance.pixels()[i].g / kUnit;
+        const double one = encoded.composite.linear.pixels()[i].g;
+        const double other = result.composite.linear.pixels()[i].g / kUnit;
+        change += std::abs(one - before);
+        off += std::abs(other - one);
+    }
+    // The light is scaled here and was not there; clipped pixels of the plate have no probe's
+    // value.
+    EXPECT_LT(off / change, std::abs(scale - 1.0) + 0.05);
+
+    project.photo.exposure.seconds = 0.5;
+    EXPECT_THAT(inputErrorOf([&] { (void)insertObjects(project, options, progress); }),
+                testing::HasSubstr("holds radiance"));
 }
 
 }  // namespace
