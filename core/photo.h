@@ -44,7 +44,7 @@ struct Photo {
     PhotoMetadata metadata;
     /// The values of an HDR photograph, finite and >= 0; empty when the file holds codes. `image`
     /// is then a copy of them, see photoFromRadiance().
-    Image<Rgb> radiance;
+    Image<Rgb> radiance{};
 };
 
 /// An HDR photograph, with codes for all that works on pictures: 16 bit, by one curve for all

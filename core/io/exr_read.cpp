@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 namespace insitu {
@@ -94,7 +95,7 @@ void limitLibrary()
     (void)done;
 }
 
-/// Runs `read` with the file open; what OpenEXR throws becomes an InputError.
+/// Runs `read` with the header checked; what OpenEXR throws becomes an InputError.
 template <class Read>
 auto withFile(const std::filesystem::path& path, std::int64_t max_pixels, const Read& read)
 {
@@ -102,8 +103,7 @@ auto withFile(const std::filesystem::path& path, std::int64_t max_pixels, const 
     try {
         limitLibrary();
         checkHeader(name, max_pixels);
-        Imf::InputFile file(name.c_str());
-        return read(file);
+        return read();
     } catch (const InputError&) {
         throw;
     } catch (const std::exception& error) {
@@ -168,47 +168,6 @@ void insertSlice(Imf::FrameBuffer& buffer,
                                    pixel_bytes * static_cast<std::size_t>(widthOf(window))));
 }
 
-Image<Rgb> readColors(Imf::InputFile& file, const std::array<std::string, 3>& names)
-{
-    const Box2i window = file.header().dataWindow();
-    Image<Rgb> image(static_cast<int>(widthOf(window)), static_cast<int>(heightOf(window)));
-    const bool grey = names[0] == names[1];
-    Imf::FrameBuffer buffer;
-    for (int c = 0; c < (grey ? 1 : 3); ++c)
-        insertSlice(
-            buffer, names[static_cast<std::size_t>(c)], &image.pixels()[0][c], sizeof(Rgb), window);
-    file.setFrameBuffer(buffer);
-    file.readPixels(window.min.y, window.max.y);
-    if (grey)
-        for (Rgb& pixel : image.pixels())
-            pixel = Rgb(pixel.r);
-    return image;
-}
-
-/// The display window cut out of (or padded around) the data window.
-Image<Rgb> displayed(Image<Rgb> data,
-                     const Imf::Header& header,
-                     const std::string& name,
-                     std::int64_t max_pixels)
-{
-    const Box2i& window = header.dataWindow();
-    const Box2i& display = header.displayWindow();
-    if (window == display) return data;
-    const std::int64_t width = widthOf(display);
-    const std::int64_t height = heightOf(display);
-    const auto data_pixels = static_cast<std::int64_t>(data.pixelCount());
-    checkImageSize(name, width, height, std::min(max_pixels, data_pixels * kLargestPadding));
-    Image<Rgb> image(static_cast<int>(width), static_cast<int>(height));
-    const int y0 = std::max(window.min.y, display.min.y);
-    const int y1 = std::min(window.max.y, display.max.y);
-    const int x0 = std::max(window.min.x, display.min.x);
-    const int x1 = std::min(window.max.x, display.max.x);
-    for (int y = y0; y <= y1; ++y)
-        for (int x = x0; x <= x1; ++x)
-            image(x - display.min.x, y - display.min.y) = data(x - window.min.x, y - window.min.y);
-    return image;
-}
-
 // --- Colour -----------------------------------------------------------------------------------
 
 bool near(const Imath::V2f& a, const Imath::V2f& b)
@@ -243,22 +202,101 @@ glm::dmat3 rec709From(const Imf::Chromaticities& primaries)
     return glm::inverse(to) * glm::inverse(bradford) * scale * bradford * from;
 }
 
-void convertPrimaries(Image<Rgb>& image, const Imf::Header& header, const std::string& name)
+/// To linear Rec. 709 from the header's primaries; nothing when they are these.
+std::optional<glm::mat3> conversionOf(const Imf::Header& header, const std::string& name)
 {
-    if (!Imf::hasChromaticities(header)) return;
+    if (!Imf::hasChromaticities(header)) return std::nullopt;
     const Imf::Chromaticities& c = Imf::chromaticities(header);
     const Imf::Chromaticities rec709;
     if (near(c.red, rec709.red) && near(c.green, rec709.green) && near(c.blue, rec709.blue) &&
         near(c.white, rec709.white))
-        return;
+        return std::nullopt;
     const glm::dmat3 m = rec709From(c);
     for (int i = 0; i < 3; ++i)
         if (!std::isfinite(m[i].x + m[i].y + m[i].z))
             throw InputError(name, "its chromaticities are not those of a colour space");
-    const glm::mat3 matrix(m);
-    for (Rgb& pixel : image.pixels())
-        pixel = matrix * pixel;
+    return glm::mat3(m);
 }
+
+/// The display window, cut out of or padded around the data window.
+class ExrRows : public RadianceRows {
+public:
+    ExrRows(const std::string& name, std::int64_t max_pixels) : name_(name), file_(name.c_str())
+    {
+        const Imf::Header& header = file_.header();
+        channels_ = chooseChannels(header.channels(), name_);
+        for (const std::string& channel : channels_)
+            checkSampling(header.channels(), channel, name_);
+        conversion_ = conversionOf(header, name_);
+        window_ = header.dataWindow();
+        display_ = header.displayWindow();
+        if (window_ != display_)
+            checkImageSize(
+                name_,
+                widthOf(display_),
+                heightOf(display_),
+                std::min(max_pixels, widthOf(window_) * heightOf(window_) * kLargestPadding));
+    }
+    [[nodiscard]] int width() const override { return static_cast<int>(widthOf(display_)); }
+    [[nodiscard]] int height() const override { return static_cast<int>(heightOf(display_)); }
+    void read(int first, Image<Rgb>& rows) override
+    {
+        try {
+            readStrip(first, rows);
+        } catch (const std::exception& error) {
+            throw InputError(name_, fmt::format("cannot be read as OpenEXR: {}", error.what()));
+        }
+    }
+
+private:
+    void readStrip(int first, Image<Rgb>& rows)
+    {
+        const int top = display_.min.y + first;
+        const int y0 = std::max(window_.min.y, top);
+        const int y1 = std::min(window_.max.y, top + rows.height() - 1);
+        const bool same_columns =
+            window_.min.x == display_.min.x && window_.max.x == display_.max.x;
+        if (same_columns && y0 == top && y1 == top + rows.height() - 1)
+            return readColors(y0, y1, rows);
+        std::ranges::fill(rows.pixels(), Rgb(0.0f));
+        if (y0 > y1) return;
+        Image<Rgb> data(static_cast<int>(widthOf(window_)), y1 - y0 + 1);
+        readColors(y0, y1, data);
+        const int x0 = std::max(window_.min.x, display_.min.x);
+        const int x1 = std::min(window_.max.x, display_.max.x);
+        for (int y = y0; y <= y1; ++y)
+            for (int x = x0; x <= x1; ++x)
+                rows(x - display_.min.x, y - top) = data(x - window_.min.x, y - y0);
+    }
+
+    /// All columns of the data window, rows y0 to y1 of the file.
+    void readColors(int y0, int y1, Image<Rgb>& data)
+    {
+        const Box2i strip({window_.min.x, y0}, {window_.max.x, y1});
+        const bool grey = channels_[0] == channels_[1];
+        Imf::FrameBuffer buffer;
+        for (int c = 0; c < (grey ? 1 : 3); ++c)
+            insertSlice(buffer,
+                        channels_[static_cast<std::size_t>(c)],
+                        &data.pixels()[0][c],
+                        sizeof(Rgb),
+                        strip);
+        file_.setFrameBuffer(buffer);
+        file_.readPixels(y0, y1);
+        if (grey)
+            for (Rgb& pixel : data.pixels())
+                pixel = Rgb(pixel.r);
+        if (conversion_)
+            for (Rgb& pixel : data.pixels())
+                pixel = *conversion_ * pixel;
+    }
+
+    std::string name_;
+    Imf::InputFile file_;
+    std::array<std::string, 3> channels_;
+    std::optional<glm::mat3> conversion_;
+    Box2i window_, display_;
+};
 
 }  // namespace
 
@@ -268,24 +306,18 @@ bool isExr(std::span<const std::uint8_t> bytes)
     return bytes.size() > kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
 }
 
-Image<Rgb> readExr(const std::filesystem::path& path, std::int64_t max_pixels)
+std::unique_ptr<RadianceRows> openExr(const std::filesystem::path& path, std::int64_t max_pixels)
 {
-    const std::string name = path.string();
-    return withFile(path, max_pixels, [&](Imf::InputFile& file) {
-        const Imf::Header& header = file.header();
-        const auto channels = chooseChannels(header.channels(), name);
-        for (const std::string& channel : channels)
-            checkSampling(header.channels(), channel, name);
-        Image<Rgb> image = readColors(file, channels);
-        convertPrimaries(image, header, name);
-        return displayed(std::move(image), header, name, max_pixels);
+    return withFile(path, max_pixels, [&]() -> std::unique_ptr<RadianceRows> {
+        return std::make_unique<ExrRows>(path.string(), max_pixels);
     });
 }
 
 std::vector<ExrChannel> readLayeredExr(const std::filesystem::path& path, std::int64_t max_pixels)
 {
     const std::string name = path.string();
-    return withFile(path, max_pixels, [&](Imf::InputFile& file) {
+    return withFile(path, max_pixels, [&] {
+        Imf::InputFile file(name.c_str());
         const Imf::ChannelList& channels = file.header().channels();
         const Box2i window = file.header().dataWindow();
         std::vector<ExrChannel> result;

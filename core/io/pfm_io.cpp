@@ -45,6 +45,46 @@ float floatAt(std::span<const std::uint8_t> bytes, std::size_t at, bool little)
     return std::bit_cast<float>(word);
 }
 
+struct PfmHeader {
+    int width = 0;
+    int height = 0;
+    std::size_t channels = 3;
+    std::size_t pixels_at = 0;  ///< byte
+    bool little = true;
+    float factor = 1.0f;
+
+    [[nodiscard]] std::size_t rowBytes() const
+    {
+        return static_cast<std::size_t>(width) * channels * 4;
+    }
+};
+
+class PfmRows : public RadianceRows {
+public:
+    PfmRows(std::unique_ptr<MappedFile> file, const PfmHeader& header)
+        : file_(std::move(file)), header_(header)
+    {
+    }
+    [[nodiscard]] int width() const override { return header_.width; }
+    [[nodiscard]] int height() const override { return header_.height; }
+    void read(int first, Image<Rgb>& rows) override
+    {
+        for (int i = 0; i < rows.height(); ++i) {
+            const auto from_bottom = static_cast<std::size_t>(header_.height - 1 - first - i);
+            std::size_t at = header_.pixels_at + from_bottom * header_.rowBytes();
+            for (Rgb& pixel : rows.row(i))
+                for (int c = 0; c < 3; ++c) {
+                    pixel[c] = header_.factor * floatAt(file_->bytes(), at, header_.little);
+                    if (header_.channels == 3 || c == 2) at += 4;
+                }
+        }
+    }
+
+private:
+    std::unique_ptr<MappedFile> file_;
+    PfmHeader header_;
+};
+
 }  // namespace
 
 bool isPfm(std::span<const std::uint8_t> bytes)
@@ -53,38 +93,32 @@ bool isPfm(std::span<const std::uint8_t> bytes)
            isSpace(bytes[2]);
 }
 
-Image<Rgb> decodePfm(std::span<const std::uint8_t> bytes,
-                     const std::string& name,
-                     std::int64_t max_pixels)
+std::unique_ptr<RadianceRows> openPfm(std::unique_ptr<MappedFile> file,
+                                      const std::string& name,
+                                      std::int64_t max_pixels)
 {
-    const std::size_t channels = bytes[1] == 'F' ? 3 : 1;
+    const std::span<const std::uint8_t> bytes = file->bytes();
+    PfmHeader header;
+    header.channels = bytes[1] == 'F' ? 3 : 1;
     std::size_t at = 2;
-    const int width = parseNumber<int>(nextWord(bytes, at), name, "width");
-    const int height = parseNumber<int>(nextWord(bytes, at), name, "height");
+    header.width = parseNumber<int>(nextWord(bytes, at), name, "width");
+    header.height = parseNumber<int>(nextWord(bytes, at), name, "height");
     const double scale = parseNumber<double>(nextWord(bytes, at), name, "scale");
     if (!std::isfinite(scale) || scale == 0.0)
         throw InputError(name, "the PFM header has no valid scale");
-    checkImageSize(name, width, height, max_pixels);
-    ++at;  // the one white space before the pixels
-    const std::size_t row_bytes = static_cast<std::size_t>(width) * channels * 4;
-    const std::size_t needed = row_bytes * static_cast<std::size_t>(height);
-    if (at > bytes.size() || bytes.size() - at < needed)
+    checkImageSize(name, header.width, header.height, max_pixels);
+    header.pixels_at = at + 1;  // after the one white space
+    const std::size_t needed = header.rowBytes() * static_cast<std::size_t>(header.height);
+    if (header.pixels_at > bytes.size() || bytes.size() - header.pixels_at < needed)
         throw InputError(name,
                          fmt::format("declares {}x{} pixels, which need {} bytes; the file ends "
                                      "early",
-                                     width,
-                                     height,
+                                     header.width,
+                                     header.height,
                                      needed));
-    const bool little = scale < 0.0;
-    const float factor = static_cast<float>(std::abs(scale));
-    Image<Rgb> image(width, height);
-    for (int y = height - 1; y >= 0; --y)
-        for (Rgb& pixel : image.row(y))
-            for (int c = 0; c < 3; ++c) {
-                pixel[c] = factor * floatAt(bytes, at, little);
-                if (channels == 3 || c == 2) at += 4;
-            }
-    return image;
+    header.little = scale < 0.0;
+    header.factor = static_cast<float>(std::abs(scale));
+    return std::make_unique<PfmRows>(std::move(file), header);
 }
 
 std::vector<std::uint8_t> encodePfm(const Image<Rgb>& image)

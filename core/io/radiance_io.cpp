@@ -1,9 +1,8 @@
-#include "core/io/file.h"
 #include "core/io/image_io.h"
 #include "core/io/image_path.h"
 #include "core/io/radiance_formats.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -21,14 +20,14 @@ std::vector<std::uint8_t> readBeginning(const std::filesystem::path& path)
     return bytes;
 }
 
-Image<Rgb> readPixels(const std::filesystem::path& path, std::int64_t max_pixels)
+std::unique_ptr<RadianceRows> openStored(const std::filesystem::path& path, std::int64_t max_pixels)
 {
     const std::string name = path.string();
     if (std::filesystem::is_regular_file(path) && isExr(readBeginning(path)))
-        return readExr(path, max_pixels);
-    const std::vector<std::uint8_t> bytes = readFile(path);
-    if (isPfm(bytes)) return decodePfm(bytes, name, max_pixels);
-    if (isRgbe(bytes)) return decodeRgbe(bytes, name, max_pixels);
+        return openExr(path, max_pixels);
+    auto file = std::make_unique<MappedFile>(path);
+    if (isPfm(file->bytes())) return openPfm(std::move(file), name, max_pixels);
+    if (isRgbe(file->bytes())) return openRgbe(std::move(file), name, max_pixels);
     throw InputError(name, "is not an OpenEXR, Radiance or PFM image");
 }
 
@@ -37,25 +36,62 @@ bool isFinite(const Rgb& c)
     return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b);
 }
 
-void checkAndClip(Image<Rgb>& image, const std::string& name)
-{
-    for (int y = 0; y < image.height(); ++y) {
-        for (int x = 0; x < image.width(); ++x) {
-            Rgb& pixel = image(x, y);
-            if (!isFinite(pixel))
-                throw InputError(name,
-                                 fmt::format("pixel ({}, {})", x, y),
-                                 fmt::format("its value ({}, {}, {}) is not finite; repair the "
-                                             "image first",
-                                             pixel.r,
-                                             pixel.g,
-                                             pixel.b));
-            pixel = glm::max(pixel, Rgb(0.0f));
-        }
+/// Values of a file, checked and clipped.
+class CheckedRows : public RadianceRows {
+public:
+    CheckedRows(std::unique_ptr<RadianceRows> stored, std::string name)
+        : stored_(std::move(stored)), name_(std::move(name))
+    {
     }
-}
+    [[nodiscard]] int width() const override { return stored_->width(); }
+    [[nodiscard]] int height() const override { return stored_->height(); }
+    void read(int first, Image<Rgb>& rows) override
+    {
+        INSITU_CHECK(rows.width() == width() && first >= 0 && first + rows.height() <= height(),
+                     "rows {} to {} of {}",
+                     first,
+                     first + rows.height(),
+                     height());
+        stored_->read(first, rows);
+        for (int y = 0; y < rows.height(); ++y)
+            for (int x = 0; x < rows.width(); ++x) {
+                Rgb& pixel = rows(x, y);
+                if (!isFinite(pixel))
+                    throw InputError(name_,
+                                     fmt::format("pixel ({}, {})", x, first + y),
+                                     fmt::format("its value ({}, {}, {}) is not finite; repair "
+                                                 "the image first",
+                                                 pixel.r,
+                                                 pixel.g,
+                                                 pixel.b));
+                pixel = glm::max(pixel, Rgb(0.0f));
+            }
+    }
+
+private:
+    std::unique_ptr<RadianceRows> stored_;
+    std::string name_;
+};
 
 }  // namespace
+
+void ImageRows::read(int first, Image<Rgb>& rows)
+{
+    INSITU_CHECK(rows.width() == width() && first >= 0 && first + rows.height() <= height(),
+                 "rows {} to {} of {}",
+                 first,
+                 first + rows.height(),
+                 height());
+    const auto from = image_.pixels().subspan(
+        static_cast<std::size_t>(first) * static_cast<std::size_t>(width()), rows.pixelCount());
+    std::ranges::copy(from, rows.pixels().begin());
+}
+
+std::unique_ptr<RadianceRows> openRadianceRows(const std::filesystem::path& path,
+                                               std::int64_t max_pixels)
+{
+    return std::make_unique<CheckedRows>(openStored(path, max_pixels), path.string());
+}
 
 bool isRadianceFile(const std::filesystem::path& path)
 {
@@ -65,9 +101,10 @@ bool isRadianceFile(const std::filesystem::path& path)
 
 RadianceImage readRadiance(const std::filesystem::path& path, std::int64_t max_pixels)
 {
+    const auto rows = openRadianceRows(path, max_pixels);
     RadianceImage image;
-    image.pixels = readPixels(path, max_pixels);
-    checkAndClip(image.pixels, path.string());
+    image.pixels = Image<Rgb>(rows->width(), rows->height());
+    rows->read(0, image.pixels);
     return image;
 }
 

@@ -44,6 +44,8 @@ public:
         throw InputError(name_, fmt::format("byte {}", at_), cause);
     }
     [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+    [[nodiscard]] std::size_t at() const { return at_; }
+    void goTo(std::size_t at) { at_ = at; }
     [[nodiscard]] std::uint8_t next()
     {
         if (at_ >= bytes_.size()) fail("the pixels end early; the file is damaged or incomplete");
@@ -243,6 +245,77 @@ void checkStorable(Reader& reader, const Header& header)
                                 reader.left()));
 }
 
+/// Rows of variable length: where each begins is known once those before it have been read.
+class RgbeRows : public RadianceRows {
+public:
+    RgbeRows(std::unique_ptr<MappedFile> file, const std::string& name, std::int64_t max_pixels)
+        : file_(std::move(file)), name_(name), reader_(file_->bytes(), name_)
+    {
+        header_ = readHeader(reader_);
+        checkImageSize(name_, header_.fast, header_.slow, max_pixels);
+        checkStorable(reader_, header_);
+        scanline_.resize(static_cast<std::size_t>(header_.fast));
+        begins_.push_back(reader_.at());
+    }
+    [[nodiscard]] bool storedByRows() const { return header_.slow_is_y; }
+    [[nodiscard]] int width() const override { return header_.fast; }
+    [[nodiscard]] int height() const override { return header_.slow; }
+
+    void read(int first, Image<Rgb>& rows) override
+    {
+        const int count = rows.height();
+        for (int k = 0; k < count; ++k) {
+            // In the file's own order, so that no row is looked for twice.
+            const int i = header_.slow_reversed ? count - 1 - k : k;
+            readStored(header_.slow_reversed ? header_.slow - 1 - first - i : first + i);
+            for (int x = 0; x < header_.fast; ++x)
+                rows(x, i) = colorAt(x);
+        }
+    }
+
+    /// The whole picture of a file that stores it column by column.
+    [[nodiscard]] Image<Rgb> readColumns()
+    {
+        Image<Rgb> image(header_.slow, header_.fast);
+        for (int i = 0; i < header_.slow; ++i) {
+            readStored(i);
+            const int x = header_.slow_reversed ? header_.slow - 1 - i : i;
+            for (int y = 0; y < header_.fast; ++y)
+                image(x, y) = colorAt(y);
+        }
+        return image;
+    }
+
+private:
+    /// Reads the i-th row of the file into scanline_.
+    void readStored(int i)
+    {
+        auto known = static_cast<int>(begins_.size()) - 1;
+        reader_.goTo(begins_[static_cast<std::size_t>(std::min(i, known))]);
+        for (int row = std::min(i, known); row <= i; ++row) {
+            readScanline(reader_, scanline_);
+            if (row == known) {
+                begins_.push_back(reader_.at());
+                ++known;
+            }
+        }
+    }
+    /// Of the scanline read last, at a place of the picture.
+    [[nodiscard]] Rgb colorAt(int place) const
+    {
+        const int j = header_.fast_reversed ? header_.fast - 1 - place : place;
+        const Rgb stored = colorOf(scanline_[static_cast<std::size_t>(j)]) / header_.divisor;
+        return header_.xyz ? rgbFromXyz(stored) : stored;
+    }
+
+    std::unique_ptr<MappedFile> file_;
+    std::string name_;
+    Reader reader_;
+    Header header_;
+    std::vector<Rgbe> scanline_;
+    std::vector<std::size_t> begins_;  ///< byte of each row that has been reached
+};
+
 }  // namespace
 
 bool isRgbe(std::span<const std::uint8_t> bytes)
@@ -256,28 +329,13 @@ bool isRgbe(std::span<const std::uint8_t> bytes)
     return atLineStart("#?RADIANCE") || atLineStart("#?RGBE");
 }
 
-Image<Rgb> decodeRgbe(std::span<const std::uint8_t> bytes,
-                      const std::string& name,
-                      std::int64_t max_pixels)
+std::unique_ptr<RadianceRows> openRgbe(std::unique_ptr<MappedFile> file,
+                                       const std::string& name,
+                                       std::int64_t max_pixels)
 {
-    Reader reader(bytes, name);
-    const Header header = readHeader(reader);
-    checkImageSize(name, header.fast, header.slow, max_pixels);
-    checkStorable(reader, header);
-    Image<Rgb> image = header.slow_is_y ? Image<Rgb>(header.fast, header.slow)
-                                        : Image<Rgb>(header.slow, header.fast);
-    std::vector<Rgbe> scanline(static_cast<std::size_t>(header.fast));
-    for (int i = 0; i < header.slow; ++i) {
-        readScanline(reader, scanline);
-        const int slow = header.slow_reversed ? header.slow - 1 - i : i;
-        for (int j = 0; j < header.fast; ++j) {
-            const int fast = header.fast_reversed ? header.fast - 1 - j : j;
-            const Rgb stored = colorOf(scanline[static_cast<std::size_t>(j)]) / header.divisor;
-            Rgb& pixel = header.slow_is_y ? image(fast, slow) : image(slow, fast);
-            pixel = header.xyz ? rgbFromXyz(stored) : stored;
-        }
-    }
-    return image;
+    auto rows = std::make_unique<RgbeRows>(std::move(file), name, max_pixels);
+    if (rows->storedByRows()) return rows;
+    return std::make_unique<ImageRows>(rows->readColumns());
 }
 
 }  // namespace insitu
