@@ -1,7 +1,11 @@
 #include "apps/cli/command.h"
 #include "apps/cli/tonemap_options.h"
-#include "core/io/image_io.h"
+#include "composite/tonemap/strips.h"
+#include "core/io/encoded_rows.h"
+#include "core/io/radiance_rows.h"
 
+#include <cstdint>
+#include <memory>
 #include <set>
 #include <vector>
 
@@ -37,13 +41,43 @@ std::vector<fs::path> outputsOf(const TonemapArguments& arguments)
     return outputs;
 }
 
+/// Pictures up to this size are read once and kept, larger ones in strips again and again.
+constexpr std::int64_t kKeptPixels = 64'000'000;
+
+std::unique_ptr<RadianceRows> openPicture(const fs::path& input)
+{
+    auto rows = openRadianceRows(input);
+    const std::int64_t pixels = std::int64_t{rows->width()} * rows->height();
+    if (pixels > kKeptPixels) return rows;
+    Image<Rgb> image(rows->width(), rows->height());
+    rows->read(0, image);
+    return std::make_unique<ImageRows>(std::move(image));
+}
+
 /// Of all pictures together; each is read again afterwards, so that one at a time is in memory.
-SceneStatistics commonStatistics(const std::vector<fs::path>& inputs)
+SceneStatistics commonStatistics(const std::vector<fs::path>& inputs, Progress& progress)
 {
     SceneStatistics statistics;
     for (const fs::path& input : inputs)
-        statistics = statistics.joined(measureScene(readRadiance(input).pixels));
+        statistics = statistics.joined(measureRows(*openPicture(input), progress));
     return statistics;
+}
+
+void mapPicture(RadianceRows& rows,
+                const ToneMapOperator& tone_map,
+                const SceneStatistics& statistics,
+                const fs::path& output,
+                int max_code,
+                Progress& progress)
+{
+    EncodedRowWriter writer(output, {rows.width(), rows.height(), max_code});
+    mapRows(
+        rows,
+        tone_map,
+        statistics,
+        [&](const Image<Rgb>& display) { writer.write(encodeSrgb(display, max_code)); },
+        progress);
+    writer.finish();
 }
 
 void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Context& context)
@@ -63,12 +97,15 @@ void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Cont
                              "is not a radiance image; give an .exr, .hdr or .pfm file");
     const auto tone_map = arguments.tone.make(command);
     SceneStatistics common;
-    if (arguments.same_curve) common = commonStatistics(arguments.inputs);
+    if (arguments.same_curve) common = commonStatistics(arguments.inputs, context.progress());
     for (std::size_t i = 0; i < outputs.size(); ++i) {
-        const Image<Rgb> scene = readRadiance(arguments.inputs[i]).pixels;
-        const SceneStatistics statistics = arguments.same_curve ? common : measureScene(scene);
-        const Image<Rgb> display = tone_map->map(scene, statistics, context.progress());
-        writeEncoded(outputs[i], encodeSrgb(display, arguments.bits == 16 ? 65535 : 255));
+        const auto rows = openPicture(arguments.inputs[i]);
+        mapPicture(*rows,
+                   *tone_map,
+                   arguments.same_curve ? common : measureRows(*rows, context.progress()),
+                   outputs[i],
+                   arguments.bits == 16 ? 65535 : 255,
+                   context.progress());
     }
 }
 

@@ -8,16 +8,19 @@ namespace insitu::tonemap {
 
 namespace {
 
-Image<Rgb> halved(const Image<Rgb>& image)
+/// The rows of the next level that are complete in the strip.
+Image<Rgb> halved(const SceneStrip& strip)
 {
-    Image<Rgb> half((image.width() + 1) / 2, (image.height() + 1) / 2);
+    const int rows =
+        strip.end() == strip.height ? (strip.rows.height() + 1) / 2 : strip.rows.height() / 2;
+    Image<Rgb> half((strip.width() + 1) / 2, rows);
     parallelFor(0, half.height(), [&](std::int64_t row) {
         const int y = static_cast<int>(row);
-        const auto above = image.row(2 * y);
-        const auto below = image.row(std::min(2 * y + 1, image.height() - 1));
+        const auto above = strip.rows.row(2 * y);
+        const auto below = strip.rows.row(std::min(2 * y + 1, strip.rows.height() - 1));
         for (int x = 0; x < half.width(); ++x) {
             const auto left = static_cast<std::size_t>(2 * x);
-            const auto right = static_cast<std::size_t>(std::min(2 * x + 1, image.width() - 1));
+            const auto right = static_cast<std::size_t>(std::min(2 * x + 1, strip.width() - 1));
             half(x, y) = 0.25f * (above[left] + above[right] + below[left] + below[right]);
         }
     });
@@ -25,14 +28,14 @@ Image<Rgb> halved(const Image<Rgb>& image)
 }
 
 /// Bilinear at (u, v), continuous coordinates, clamped.
-Rgb bilinear(const Image<Rgb>& image, float u, float v)
+Rgb bilinear(const SceneStrip& image, float u, float v)
 {
     const float fx = std::clamp(u - 0.5f, 0.0f, static_cast<float>(image.width() - 1));
-    const float fy = std::clamp(v - 0.5f, 0.0f, static_cast<float>(image.height() - 1));
+    const float fy = std::clamp(v - 0.5f, 0.0f, static_cast<float>(image.height - 1));
     const int x0 = static_cast<int>(fx);
     const int y0 = static_cast<int>(fy);
     const int x1 = std::min(x0 + 1, image.width() - 1);
-    const int y1 = std::min(y0 + 1, image.height() - 1);
+    const int y1 = std::min(y0 + 1, image.height - 1);
     const float tx = fx - static_cast<float>(x0);
     const float ty = fy - static_cast<float>(y0);
     const Rgb top = image(x0, y0) + tx * (image(x1, y0) - image(x0, y0));
@@ -42,23 +45,26 @@ Rgb bilinear(const Image<Rgb>& image, float u, float v)
 
 }  // namespace
 
-AcuityPyramid::AcuityPyramid(const Image<Rgb>& scene, int levels) : scene_(scene)
+AcuityPyramid::AcuityPyramid(const SceneStrip& strip, int levels) : strip_(strip)
 {
     for (int level = 0; level < levels; ++level) {
-        const Image<Rgb>& finer = at(level);
-        if (finer.width() == 1 && finer.height() == 1) break;
-        halved_.push_back(halved(finer));
+        const SceneStrip finer = at(level);
+        if (finer.width() == 1 && finer.height == 1) break;
+        INSITU_CHECK(finer.first % 2 == 0, "level {} begins at row {}", level, finer.first);
+        halved_.push_back({halved(finer), finer.first / 2, (finer.height + 1) / 2});
     }
 }
 
-const Image<Rgb>& AcuityPyramid::at(int level) const
+SceneStrip AcuityPyramid::at(int level) const
 {
-    return level == 0 ? scene_ : halved_[static_cast<std::size_t>(level - 1)];
+    if (level == 0) return strip_;
+    const Level& halved = halved_[static_cast<std::size_t>(level - 1)];
+    return {halved.rows, halved.first, halved.height};
 }
 
 Rgb AcuityPyramid::sample(int x, int y, float level) const
 {
-    if (level <= 0.0f) return scene_(x, y);
+    if (level <= 0.0f) return strip_(x, y);
     const int coarsest = static_cast<int>(halved_.size());
     const int finer = std::min(static_cast<int>(level), coarsest);
     const int coarser = std::min(finer + 1, coarsest);

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 namespace insitu {
 
@@ -14,52 +16,102 @@ namespace {
 /// What saves black pixels from the logarithm, as a share of the mean luminance.
 constexpr double kDelta = 1e-6;
 
+class DurandMapping : public SceneMapping {
+public:
+    DurandMapping(const DurandOptions& options,
+                  int width,
+                  int height,
+                  const SceneStatistics& statistics)
+        : options_(options),
+          delta_(kDelta * statistics.mean),
+          black_(statistics.largest == 0.0),
+          grid_({width,
+                 height,
+                 black_ ? 0.0 : std::log10(delta_ + statistics.smallest),
+                 black_ ? 0.0 : std::log10(delta_ + statistics.largest)},
+                std::max(1.0, options.spatial_sigma * std::max(width, height)),
+                options.range_sigma)
+    {
+    }
+
+    /// The grid, then the range of the filtered values.
+    [[nodiscard]] int passes() const override { return black_ ? 0 : 2; }
+    void gather(int pass, const SceneStrip& strip) override
+    {
+        Image<float> logarithms(strip.width(), strip.rows.height());
+        parallelFor(0, strip.rows.height(), [&](std::int64_t row) {
+            const auto i = static_cast<int>(row);
+            for (int x = 0; x < strip.width(); ++x) {
+                const float own = logOf(strip.rows(x, i));
+                logarithms(x, i) = pass == 0 ? own : grid_.at(x, strip.first + i, own);
+            }
+        });
+        if (pass == 0) {
+            for (int i = 0; i < logarithms.height(); ++i) {
+                const auto row = logarithms.row(i);
+                grid_.add(strip.first + i, std::vector<float>(row.begin(), row.end()));
+            }
+            return;
+        }
+        const auto [low, high] = std::ranges::minmax(logarithms.pixels());
+        low_ = std::min(low_, low);
+        high_ = std::max(high_, high);
+    }
+    void endPass(int pass) override
+    {
+        if (pass == 0) grid_.blur();
+    }
+
+    void map(const SceneStrip& strip,
+             int top,
+             Image<Rgb>& display,
+             Progress& /*progress*/) const override
+    {
+        if (black_) {
+            std::ranges::fill(display.pixels(), Rgb(0.0f));
+            return;
+        }
+        const double range = high_ - low_;
+        const double wanted = std::log10(options_.base_contrast);
+        const double factor = range > wanted ? wanted / range : 1.0;
+        const double white = high_;
+        parallelFor(0, display.height(), [&](std::int64_t row) {
+            const int y = top + static_cast<int>(row);
+            for (int x = 0; x < strip.width(); ++x) {
+                const Rgb& color = strip(x, y);
+                const float own = logOf(color);
+                const double base = grid_.at(x, y, own);
+                const double shown = factor * (base - white) + (static_cast<double>(own) - base);
+                const double gain =
+                    std::pow(10.0, shown) / (delta_ + static_cast<double>(luminance(color)));
+                display(x, static_cast<int>(row)) =
+                    glm::min(static_cast<float>(gain) * color, Rgb(1.0f));
+            }
+        });
+    }
+
+private:
+    [[nodiscard]] float logOf(const Rgb& color) const
+    {
+        return static_cast<float>(std::log10(delta_ + static_cast<double>(luminance(color))));
+    }
+
+    DurandOptions options_;
+    double delta_;
+    bool black_;
+    tonemap::BilateralGrid grid_;
+    float low_ = std::numeric_limits<float>::max();  ///< of the filtered logarithms
+    float high_ = std::numeric_limits<float>::lowest();
+};
+
 class Durand : public ToneMapOperator {
 public:
     explicit Durand(const DurandOptions& options) : options_(options) {}
 
-    void mapInto(Image<Rgb>& display,
-                 const Image<Rgb>& scene,
-                 const SceneStatistics& statistics,
-                 Progress& progress) const override
+    [[nodiscard]] std::unique_ptr<SceneMapping> begin(
+        int width, int height, const SceneStatistics& statistics) const override
     {
-        INSITU_CHECK(display.sameSize(scene), "{}x{}", display.width(), display.height());
-        if (scene.empty()) return;
-        progress.checkpoint();
-        if (statistics.largest == 0.0) {
-            std::ranges::fill(display.pixels(), Rgb(0.0f));
-            return;
-        }
-        const double delta = kDelta * statistics.mean;
-        Image<float> logarithm(scene.width(), scene.height());
-        const auto rows = [&](const auto& body) {
-            parallelFor(0, scene.height(), [&](std::int64_t row) {
-                for (int x = 0; x < scene.width(); ++x)
-                    body(x, static_cast<int>(row));
-            });
-        };
-        rows([&](int x, int y) {
-            logarithm(x, y) =
-                static_cast<float>(std::log10(delta + static_cast<double>(luminance(scene(x, y)))));
-        });
-        const Image<float> base = tonemap::bilateralFilter(
-            logarithm,
-            std::max(1.0, options_.spatial_sigma * std::max(scene.width(), scene.height())),
-            options_.range_sigma);
-        const auto [low, high] = std::minmax_element(base.pixels().begin(), base.pixels().end());
-        const double range = *high - *low;
-        const double wanted = std::log10(options_.base_contrast);
-        const double factor = range > wanted ? wanted / range : 1.0;
-        const double white = *high;
-        rows([&](int x, int y) {
-            const double own = logarithm(x, y);
-            const double shown = factor * (base(x, y) - white) + (own - base(x, y));
-            const double gain =
-                std::pow(10.0, shown) / (delta + static_cast<double>(luminance(scene(x, y))));
-            display(x, y) = glm::min(static_cast<float>(gain) * scene(x, y), Rgb(1.0f));
-        });
-        progress.checkpoint();
-        progress.report("tone mapping", 1.0);
+        return std::make_unique<DurandMapping>(options_, width, height, statistics);
     }
 
 private:

@@ -15,16 +15,9 @@ namespace {
 
 constexpr double kDegree = 0.01745;  ///< as in equation 5.1
 
-/// Weights of the pixels that each of `cells` cells covers.
-struct Cover {
-    std::vector<int> first;
-    std::vector<float> first_weight, last_weight;  ///< the pixels between count 1
-    std::vector<int> last;
-};
-
-Cover coverOf(int pixels, int cells)
+CellCover coverOf(int pixels, int cells)
 {
-    Cover cover;
+    CellCover cover;
     for (int i = 0; i < cells; ++i) {
         const double from = static_cast<double>(i) * pixels / cells;
         const double to = static_cast<double>(i + 1) * pixels / cells;
@@ -39,7 +32,7 @@ Cover coverOf(int pixels, int cells)
 }
 
 template <class Get>
-Rgb coveredMean(const Cover& cover, std::size_t cell, const Get& get)
+Rgb coveredMean(const CellCover& cover, std::size_t cell, const Get& get)
 {
     const int first = cover.first[cell];
     const int last = cover.last[cell];
@@ -75,37 +68,58 @@ cv::Mat kernelSpectrum(const cv::Size& size)
 
 }  // namespace
 
-Image<Rgb> fovealImage(const Image<Rgb>& scene, double field_of_view)
+FovealImage::FovealImage(int scene_width, int scene_height, double field_of_view)
 {
     const double across = 2.0 * std::tan(0.5 * field_of_view) / kDegree;
-    const double down = across * scene.height() / scene.width();
-    const int width = std::clamp(static_cast<int>(std::lround(across)), 1, scene.width());
-    const int height = std::clamp(static_cast<int>(std::lround(down)), 1, scene.height());
-    const Cover columns = coverOf(scene.width(), width);
-    const Cover rows = coverOf(scene.height(), height);
-    Image<Rgb> foveal(width, height);
-    parallelFor(0, height, [&](std::int64_t row) {
+    const double down = across * scene_height / scene_width;
+    const int width = std::clamp(static_cast<int>(std::lround(across)), 1, scene_width);
+    const int height = std::clamp(static_cast<int>(std::lround(down)), 1, scene_height);
+    columns_ = coverOf(scene_width, width);
+    rows_ = coverOf(scene_height, height);
+    image_ = Image<Rgb>(width, height);
+}
+
+void FovealImage::add(const SceneStrip& strip)
+{
+    const auto begin = std::ranges::lower_bound(rows_.last, strip.first);
+    const auto end = std::ranges::lower_bound(rows_.first, strip.end());
+    std::vector<Rgb> left_line;
+    float left_weight = 0.0f;
+    parallelFor(begin - rows_.last.begin(), end - rows_.first.begin(), [&](std::int64_t row) {
         const auto y = static_cast<std::size_t>(row);
         // Rows first: long lines.
-        std::vector<Rgb> line(static_cast<std::size_t>(scene.width()), Rgb(0.0f));
+        std::vector<Rgb> line(static_cast<std::size_t>(strip.width()), Rgb(0.0f));
         float weights = 0.0f;
-        for (int k = rows.first[y]; k <= rows.last[y]; ++k) {
-            const float weight = k == rows.first[y]  ? rows.first_weight[y]
-                                 : k == rows.last[y] ? rows.last_weight[y]
-                                                     : 1.0f;
+        if (rows_.first[y] < strip.first) {
+            line = open_line_;
+            weights = open_weight_;
+        }
+        for (int k = std::max(rows_.first[y], strip.first);
+             k <= std::min(rows_.last[y], strip.end() - 1);
+             ++k) {
+            const float weight = k == rows_.first[y]  ? rows_.first_weight[y]
+                                 : k == rows_.last[y] ? rows_.last_weight[y]
+                                                      : 1.0f;
             weights += weight;
-            const auto source = scene.row(k);
+            const auto source = strip.row(k);
             for (std::size_t x = 0; x < line.size(); ++x)
                 line[x] += weight * source[x];
         }
-        for (int x = 0; x < width; ++x)
-            foveal(x, static_cast<int>(row)) =
-                coveredMean(columns,
+        if (rows_.last[y] >= strip.end()) {
+            // Cells share at most a row, so that one of them is left open.
+            left_line = std::move(line);
+            left_weight = weights;
+            return;
+        }
+        for (int x = 0; x < image_.width(); ++x)
+            image_(x, static_cast<int>(row)) =
+                coveredMean(columns_,
                             static_cast<std::size_t>(x),
                             [&](int i) { return line[static_cast<std::size_t>(i)]; }) /
                 weights;
     });
-    return foveal;
+    open_line_ = std::move(left_line);
+    open_weight_ = left_weight;
 }
 
 Image<Rgb> veilingLuminance(const Image<Rgb>& foveal)

@@ -1,17 +1,43 @@
 #pragma once
 
+#include "composite/tonemap/scene_strip.h"
 #include "core/image.h"
+
+#include <vector>
 
 namespace insitu::tonemap {
 
 /// The picture as a grid of places that the fovea may rest on, and what scatters in the eye there.
 /// Private to this module.
 
+/// Weights of the pixels that each of some cells covers, along one axis.
+struct CellCover {
+    std::vector<int> first;
+    std::vector<float> first_weight, last_weight;  ///< the pixels between count 1
+    std::vector<int> last;
+};
+
 /// Mean colour of each square degree, seen with a horizontal field of `field_of_view` radians:
 /// 2 tan(field / 2) / 0.01745 pixels wide, as high as the picture's shape asks, at least 1x1, never
 /// finer than the picture. Means are exact: border pixels of a cell count with the part inside.
 /// Source: [Mollis04] equation 5.1.
-[[nodiscard]] Image<Rgb> fovealImage(const Image<Rgb>& scene, double field_of_view);
+class FovealImage {
+public:
+    /// Of a scene of this size.
+    FovealImage(int width, int height, double field_of_view);
+
+    /// Adds the scene's strips, from the top, each row once.
+    void add(const SceneStrip& strip);
+    /// Complete once all rows have been added.
+    [[nodiscard]] const Image<Rgb>& image() const { return image_; }
+
+private:
+    CellCover columns_, rows_;
+    Image<Rgb> image_;
+    /// Sums over the rows of the cells that the last strip ended in.
+    std::vector<Rgb> open_line_;
+    float open_weight_ = 0.0f;
+};
 
 /// Veiling luminance at each place: mean of all other places weighted with cos(angle) / angle², the
 /// angle a degree for each foveal pixel, below 90°.

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 namespace insitu {
 
@@ -78,34 +79,44 @@ struct Observer {
     float deepest = 0.0f;  ///< level of the pyramid
 };
 
-class HistogramAdjustment : public ToneMapOperator {
+class HistogramMapping : public SceneMapping {
 public:
-    explicit HistogramAdjustment(const HistogramAdjustmentOptions& options) : options_(options) {}
-
-    void mapInto(Image<Rgb>& display,
-                 const Image<Rgb>& scene,
-                 const SceneStatistics& statistics,
-                 Progress& progress) const override
+    HistogramMapping(const HistogramAdjustmentOptions& options,
+                     int width,
+                     int height,
+                     const SceneStatistics& statistics)
+        : options_(options),
+          width_(width),
+          foveal_(width, height, options.field_of_view_deg * std::numbers::pi / 180.0)
     {
-        INSITU_CHECK(display.sameSize(scene), "{}x{}", display.width(), display.height());
-        if (scene.empty()) return;
+        observer_.scale = static_cast<float>(options_.viewing.scale(statistics));
+    }
+
+    [[nodiscard]] int passes() const override { return 1; }
+    void gather(int /*pass*/, const SceneStrip& strip) override { foveal_.add(strip); }
+    void endPass(int /*pass*/) override { observe(foveal_.image()); }
+
+    /// The pyramid's levels are looked up a place of theirs to each side.
+    [[nodiscard]] int reach() const override { return levels() > 0 ? 2 * alignment() : 0; }
+    [[nodiscard]] int alignment() const override { return 1 << levels(); }
+    void map(const SceneStrip& strip,
+             int top,
+             Image<Rgb>& display,
+             Progress& progress) const override
+    {
+        const AcuityPyramid pyramid(strip, levels());
         progress.checkpoint();
-        const Observer observer = observe(scene, statistics);
-        const AcuityPyramid pyramid(scene, static_cast<int>(std::ceil(observer.deepest)));
-        progress.checkpoint();
-        parallelFor(0, scene.height(), [&](std::int64_t row) {
-            mapRow(observer, pyramid, scene, static_cast<int>(row), display);
+        parallelFor(0, display.height(), [&](std::int64_t row) {
+            mapRow(pyramid, strip, top + static_cast<int>(row), display.row(static_cast<int>(row)));
         });
-        progress.report("tone mapping", 1.0);
     }
 
 private:
-    [[nodiscard]] Observer observe(const Image<Rgb>& scene, const SceneStatistics& statistics) const
+    [[nodiscard]] int levels() const { return static_cast<int>(std::ceil(observer_.deepest)); }
+
+    void observe(Image<Rgb> foveal)
     {
-        const double field = options_.field_of_view_deg * std::numbers::pi / 180.0;
-        Observer observer;
-        observer.scale = static_cast<float>(options_.viewing.scale(statistics));
-        Image<Rgb> foveal = tonemap::fovealImage(scene, field);
+        Observer& observer = observer_;
         for (Rgb& place : foveal.pixels())
             place *= observer.scale;
         observer.places = Image<Place>(foveal.width(), foveal.height());
@@ -119,7 +130,7 @@ private:
             }
         }
         // Equation 5.3: what the picture itself resolves in the middle, cycles per degree.
-        const double resolved = 0.5 * scene.width() / options_.field_of_view_deg;
+        const double resolved = 0.5 * width_ / options_.field_of_view_deg;
         std::vector<float> adaptation(foveal.pixelCount());
         parallelFor(0, foveal.height(), [&](std::int64_t row) {
             for (int x = 0; x < foveal.width(); ++x) {
@@ -136,17 +147,16 @@ private:
             observer.deepest = std::max(observer.deepest, place.level);
         observer.curve = tonemap::histogramCurve(
             adaptation, options_.display_black_cd_m2, options_.viewing.display_white_cd_m2);
-        return observer;
     }
 
-    void mapRow(const Observer& observer,
-                const AcuityPyramid& pyramid,
-                const Image<Rgb>& scene,
+    void mapRow(const AcuityPyramid& pyramid,
+                const SceneStrip& scene,
                 int y,
-                Image<Rgb>& display) const
+                std::span<Rgb> display) const
     {
+        const Observer& observer = observer_;
         const Image<Place>& places = observer.places;
-        const Between down = between(y, scene.height(), places.height());
+        const Between down = between(y, scene.height, places.height());
         std::vector<Place> line(static_cast<std::size_t>(places.width()));
         for (int i = 0; i < places.width(); ++i)
             line[static_cast<std::size_t>(i)] =
@@ -159,10 +169,28 @@ private:
             const Rgb light = observer.scale * pyramid.sample(x, y, place.level);
             Rgb color = observer.direct * light + place.veil;
             if (options_.color) color = mesopic(color);
-            display(x, y) = glm::min(color * gainOf(observer.curve, luminance(color)), Rgb(1.0f));
+            display[static_cast<std::size_t>(x)] =
+                glm::min(color * gainOf(observer.curve, luminance(color)), Rgb(1.0f));
         }
     }
 
+    HistogramAdjustmentOptions options_;
+    int width_;
+    tonemap::FovealImage foveal_;
+    Observer observer_;
+};
+
+class HistogramAdjustment : public ToneMapOperator {
+public:
+    explicit HistogramAdjustment(const HistogramAdjustmentOptions& options) : options_(options) {}
+
+    [[nodiscard]] std::unique_ptr<SceneMapping> begin(
+        int width, int height, const SceneStatistics& statistics) const override
+    {
+        return std::make_unique<HistogramMapping>(options_, width, height, statistics);
+    }
+
+private:
     HistogramAdjustmentOptions options_;
 };
 

@@ -43,18 +43,23 @@ private:
     cv::utils::logging::LogLevel before_;
 };
 
-class FromLibrary : public ToneMapOperator {
+/// The library measures a scene by itself, so it needs all of it at once.
+class LibraryMapping : public SceneMapping {
 public:
-    explicit FromLibrary(LibraryOperator which) : which_(which) {}
-
-    void mapInto(Image<Rgb>& display,
-                 const Image<Rgb>& scene,
-                 const SceneStatistics& statistics,
-                 Progress& progress) const override
+    LibraryMapping(LibraryOperator which, const SceneStatistics& statistics)
+        : which_(which), statistics_(statistics)
     {
+    }
+
+    [[nodiscard]] int reach() const override { return kWhole; }
+    void map(const SceneStrip& strip,
+             int /*top*/,
+             Image<Rgb>& display,
+             Progress& progress) const override
+    {
+        const Image<Rgb>& scene = strip.rows;
+        const SceneStatistics& statistics = statistics_;
         INSITU_CHECK(display.sameSize(scene), "{}x{}", display.width(), display.height());
-        if (scene.empty()) return;
-        progress.checkpoint();
         if (statistics.largest <= statistics.smallest) {
             const float level = statistics.largest > 0.0
                                     ? kMiddleGrey / static_cast<float>(statistics.largest)
@@ -94,7 +99,21 @@ public:
                 }
             }
         progress.checkpoint();
-        progress.report("tone mapping", 1.0);
+    }
+
+private:
+    LibraryOperator which_;
+    SceneStatistics statistics_;
+};
+
+class FromLibrary : public ToneMapOperator {
+public:
+    explicit FromLibrary(LibraryOperator which) : which_(which) {}
+
+    [[nodiscard]] std::unique_ptr<SceneMapping> begin(
+        int /*width*/, int /*height*/, const SceneStatistics& statistics) const override
+    {
+        return std::make_unique<LibraryMapping>(which_, statistics);
     }
 
 private:

@@ -8,6 +8,26 @@
 
 namespace insitu {
 
+void ToneMapOperator::mapInto(Image<Rgb>& display,
+                              const Image<Rgb>& scene,
+                              const SceneStatistics& statistics,
+                              Progress& progress) const
+{
+    INSITU_CHECK(display.sameSize(scene), "{}x{}", display.width(), display.height());
+    if (scene.empty()) return;
+    progress.checkpoint();
+    const SceneStrip whole(scene);
+    const auto mapping = begin(scene.width(), scene.height(), statistics);
+    for (int pass = 0; pass < mapping->passes(); ++pass) {
+        mapping->gather(pass, whole);
+        mapping->endPass(pass);
+        progress.checkpoint();
+    }
+    mapping->map(whole, 0, display, progress);
+    progress.checkpoint();
+    progress.report("tone mapping", 1.0);
+}
+
 EncodedImage encodeSrgb(const Image<Rgb>& display, int max_code)
 {
     INSITU_CHECK(max_code == 255 || max_code == 65535, "{}", max_code);

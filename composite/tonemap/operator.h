@@ -1,10 +1,43 @@
 #pragma once
 
 #include "composite/tonemap/scene_statistics.h"
+#include "composite/tonemap/scene_strip.h"
 #include "core/photo.h"
 #include "core/progress.h"
 
+#include <memory>
+
 namespace insitu {
+
+/// An operator at work on one scene, strip by strip.
+///
+/// First come the passes that gather, each over all of the scene: strips from the top, without
+/// overlap. Then strips are mapped, in any order; the result does not depend on how the scene is
+/// cut, as long as strips begin at multiples of kStripRows.
+class SceneMapping {
+public:
+    static constexpr int kStripRows = 512;
+    /// Rows beyond any scene's.
+    static constexpr int kWhole = 1 << 30;
+
+    virtual ~SceneMapping() = default;
+
+    [[nodiscard]] virtual int passes() const { return 0; }
+    virtual void gather(int /*pass*/, const SceneStrip& /*strip*/) {}
+    virtual void endPass(int /*pass*/) {}
+
+    /// Known once all is gathered: how far above and below the rows to be mapped a strip must hold
+    /// the scene's rows; kWhole: it must be the whole scene.
+    [[nodiscard]] virtual int reach() const { return 0; }
+    /// The strip must begin at a multiple of this, besides.
+    [[nodiscard]] virtual int alignment() const { return 1; }
+    /// Maps the scene's rows from `top` on into `display`, which is as wide as the scene and begins
+    /// there. Calls are not thread-safe, but each uses all threads.
+    virtual void map(const SceneStrip& strip,
+                     int top,
+                     Image<Rgb>& display,
+                     Progress& progress) const = 0;
+};
 
 /// A tone mapping operator: scene-linear radiance to what a display can show, for *viewing* HDR
 /// pictures. The composite itself never passes one; it returns through the photograph's own
@@ -38,10 +71,14 @@ public:
         return display;
     }
     /// The same into an image of the scene's size, for callers that keep one from frame to frame.
-    virtual void mapInto(Image<Rgb>& display,
-                         const Image<Rgb>& scene,
-                         const SceneStatistics& statistics,
-                         Progress& progress) const = 0;
+    void mapInto(Image<Rgb>& display,
+                 const Image<Rgb>& scene,
+                 const SceneStatistics& statistics,
+                 Progress& progress) const;
+
+    /// For a scene of this size, >= 1x1, that comes in strips.
+    [[nodiscard]] virtual std::unique_ptr<SceneMapping> begin(
+        int width, int height, const SceneStatistics& statistics) const = 0;
 };
 
 /// Display-linear colour through the sRGB curve, rounded to the nearest code; values outside [0, 1]

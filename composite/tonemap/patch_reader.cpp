@@ -111,11 +111,11 @@ void readRow(InstructionSet set, const RowArguments& a)
 }  // namespace
 
 LuminancePatch readPatch(
-    const Image<Rgb>& scene, int x0, int y0, int width, int height, int halo, float scale)
+    const SceneStrip& scene, int x0, int y0, int width, int height, int halo, float scale)
 {
     LuminancePatch patch;
     patch.width = roundedUp(std::min(width, scene.width() - x0));
-    patch.height = roundedUp(std::min(height, scene.height() - y0));
+    patch.height = roundedUp(std::min(height, scene.height - y0));
     patch.halo = halo;
     const int rows = patch.height + 2 * halo;
     const int columns = patch.width + 2 * halo;
@@ -125,7 +125,7 @@ LuminancePatch readPatch(
     std::vector<float> line(static_cast<std::size_t>(columns));
     const InstructionSet set = bestInstructionSet();
     for (int row = 0; row < rows; ++row) {
-        const int y = std::clamp(y0 - halo + row, 0, scene.height() - 1);
+        const int y = std::clamp(y0 - halo + row, 0, scene.height - 1);
         float* const even = patch.values.get() + row * patch.stride();
         readRow(set,
                 {scene.row(y).data(),

@@ -12,7 +12,7 @@ constexpr int kTileHeight = 512;
 /// The part of the picture that starts at (x0, y0), multiples of 4, luminance times `scale`.
 /// The tile is width x height or what is left of the picture, filled up to multiples of 4.
 [[nodiscard]] LuminancePatch readPatch(
-    const Image<Rgb>& scene, int x0, int y0, int width, int height, int halo, float scale);
+    const SceneStrip& scene, int x0, int y0, int width, int height, int halo, float scale);
 
 /// What the curve made of a row of a patch, even columns first.
 struct RowResult {

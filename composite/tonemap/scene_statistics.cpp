@@ -142,7 +142,7 @@ void overRows(Pass pass, const Image<Rgb>& scene, float delta, std::vector<RowSu
     });
 }
 
-[[noreturn]] void refuse(const Image<Rgb>& scene, int y)
+[[noreturn]] void refuse(const SceneStrip& scene, int y)
 {
     for (int x = 0; x < scene.width(); ++x) {
         const Rgb& pixel = scene(x, y);
@@ -157,31 +157,47 @@ void overRows(Pass pass, const Image<Rgb>& scene, float delta, std::vector<RowSu
 
 }  // namespace
 
+void SceneMeter::gather(int pass, const SceneStrip& strip)
+{
+    std::vector<RowSums> rows(static_cast<std::size_t>(strip.rows.height()));
+    if (pass == 1) {
+        if (statistics_.largest == 0.0) return;
+        overRows(Pass::Logarithms, strip.rows, static_cast<float>(1e-6 * statistics_.mean), rows);
+        for (const RowSums& row : rows)
+            sum_ += row.log_sum;
+        return;
+    }
+    overRows(Pass::Values, strip.rows, 0.0f, rows);
+    if (statistics_.pixels == 0) statistics_.smallest = std::numeric_limits<double>::infinity();
+    statistics_.pixels += static_cast<std::int64_t>(strip.rows.pixelCount());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        const RowSums& row = rows[i];
+        if (!row.good) refuse(strip, strip.first + static_cast<int>(i));
+        statistics_.smallest = std::min(statistics_.smallest, static_cast<double>(row.smallest));
+        statistics_.largest = std::max(statistics_.largest, static_cast<double>(row.largest));
+        sum_ += row.sum;
+    }
+}
+
+void SceneMeter::endPass(int pass)
+{
+    const auto pixels = static_cast<double>(statistics_.pixels);
+    if (pass == 0)
+        statistics_.mean = sum_ / pixels;
+    else if (statistics_.largest > 0.0)
+        statistics_.log_average = std::exp(sum_ / pixels);
+    sum_ = 0.0;
+}
+
 SceneStatistics measureScene(const Image<Rgb>& scene)
 {
-    SceneStatistics statistics;
-    if (scene.empty()) return statistics;
-    std::vector<RowSums> rows(static_cast<std::size_t>(scene.height()));
-    overRows(Pass::Values, scene, 0.0f, rows);
-
-    statistics.pixels = static_cast<std::int64_t>(scene.pixelCount());
-    statistics.smallest = std::numeric_limits<double>::infinity();
-    for (int y = 0; y < scene.height(); ++y) {
-        const RowSums& row = rows[static_cast<std::size_t>(y)];
-        if (!row.good) refuse(scene, y);
-        statistics.smallest = std::min(statistics.smallest, static_cast<double>(row.smallest));
-        statistics.largest = std::max(statistics.largest, static_cast<double>(row.largest));
-        statistics.mean += row.sum;
+    if (scene.empty()) return {};
+    SceneMeter meter;
+    for (int pass = 0; pass < SceneMeter::kPasses; ++pass) {
+        meter.gather(pass, SceneStrip(scene));
+        meter.endPass(pass);
     }
-    statistics.mean /= static_cast<double>(statistics.pixels);
-    if (statistics.largest == 0.0) return statistics;
-
-    overRows(Pass::Logarithms, scene, static_cast<float>(1e-6 * statistics.mean), rows);
-    double log_sum = 0.0;
-    for (const RowSums& row : rows)
-        log_sum += row.log_sum;
-    statistics.log_average = std::exp(log_sum / static_cast<double>(statistics.pixels));
-    return statistics;
+    return meter.statistics();
 }
 
 SceneStatistics SceneStatistics::joined(const SceneStatistics& other) const

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "composite/tonemap/scene_strip.h"
 #include "core/image.h"
 
 #include <cstdint>
@@ -18,6 +19,21 @@ struct SceneStatistics {
 
     /// Those of both together: two photographs that share a curve.
     [[nodiscard]] SceneStatistics joined(const SceneStatistics& other) const;
+};
+
+/// measureScene() of a scene that comes in strips: kPasses passes over all of it, from the top.
+class SceneMeter {
+public:
+    static constexpr int kPasses = 2;
+
+    void gather(int pass, const SceneStrip& strip);
+    void endPass(int pass);
+    /// After the last pass.
+    [[nodiscard]] const SceneStatistics& statistics() const { return statistics_; }
+
+private:
+    SceneStatistics statistics_;
+    double sum_ = 0.0;  ///< of what the pass sums
 };
 
 /// Throws InputError naming the first pixel, in order of rows, that is not finite and >= 0.

@@ -93,16 +93,16 @@ private:
     Image<float> always_;
 };
 
-void requireSize(const Image<float>& map, const Image<Rgb>& scene, const char* name)
+void requireSize(const Image<float>& map, int width, int height, const char* name)
 {
-    if (map.empty() || map.sameSize(scene)) return;
+    if (map.empty() || (map.width() == width && map.height() == height)) return;
     throw InputError("tone mapping",
                      fmt::format("the {} is {}x{}, the picture {}x{}; sizes must be the same",
                                  name,
                                  map.width(),
                                  map.height(),
-                                 scene.width(),
-                                 scene.height()));
+                                 width,
+                                 height));
 }
 
 class Selective : public ToneMapOperator {
@@ -112,17 +112,15 @@ public:
     {
     }
 
-    void mapInto(Image<Rgb>& display,
-                 const Image<Rgb>& scene,
-                 const SceneStatistics& statistics,
-                 Progress& progress) const override
+    [[nodiscard]] std::unique_ptr<SceneMapping> begin(
+        int width, int height, const SceneStatistics& statistics) const override
     {
-        requireSize(options_.always, scene, "map of what always counts");
-        requireSize(options_.importance, scene, "importance map");
-        const auto curve = tone_map_->curve(statistics);
-        const auto local = tone_map_->local();
-        tonemap::mapTiles(
-            scene, *curve, local.get(), local ? &selected_ : nullptr, display, progress);
+        requireSize(options_.always, width, height, "map of what always counts");
+        requireSize(options_.importance, width, height, "importance map");
+        auto local = tone_map_->local();
+        const bool anywhere = local != nullptr;
+        return std::make_unique<tonemap::TileMapping>(
+            tone_map_->curve(statistics), std::move(local), anywhere ? &selected_ : nullptr);
     }
 
 private:
@@ -171,7 +169,7 @@ double selectedShare(const SeparableOperator& tone_map,
     std::size_t blocks = 0;
     for (int y = 0; y < scene.height(); y += tonemap::kTileHeight)
         for (int x = 0; x < scene.width(); x += tonemap::kTileWidth) {
-            const LuminancePatch patch = tonemap::readPatch(scene,
+            const LuminancePatch patch = tonemap::readPatch(SceneStrip(scene),
                                                             x,
                                                             y,
                                                             tonemap::kTileWidth,

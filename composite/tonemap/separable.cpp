@@ -11,14 +11,11 @@ bool WantedBlocks::any() const
     return std::find(wanted.begin(), wanted.end(), std::uint8_t{1}) != wanted.end();
 }
 
-void SeparableOperator::mapInto(Image<Rgb>& display,
-                                const Image<Rgb>& scene,
-                                const SceneStatistics& statistics,
-                                Progress& progress) const
+std::unique_ptr<SceneMapping> SeparableOperator::begin(int /*width*/,
+                                                       int /*height*/,
+                                                       const SceneStatistics& statistics) const
 {
-    const auto tone_curve = curve(statistics);
-    const auto adaptation = local();
-    tonemap::mapTiles(scene, *tone_curve, adaptation.get(), nullptr, display, progress);
+    return std::make_unique<tonemap::TileMapping>(curve(statistics), local(), nullptr);
 }
 
 }  // namespace insitu

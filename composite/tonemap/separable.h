@@ -78,10 +78,8 @@ public:
 /// Source: [Michael10] 4.3, equation 16, and 4.4.
 class SeparableOperator : public ToneMapOperator {
 public:
-    void mapInto(Image<Rgb>& display,
-                 const Image<Rgb>& scene,
-                 const SceneStatistics& statistics,
-                 Progress& progress) const override;
+    [[nodiscard]] std::unique_ptr<SceneMapping> begin(
+        int width, int height, const SceneStatistics& statistics) const override;
 
     [[nodiscard]] virtual std::unique_ptr<ToneCurve> curve(
         const SceneStatistics& statistics) const = 0;

@@ -55,7 +55,7 @@ using Luminances = std::unique_ptr<float[]>;
 
 /// A tile of the picture, and what it is mapped with.
 struct Tile {
-    const Image<Rgb>& scene;
+    const SceneStrip& scene;
     const ToneCurve& curve;
     int x0, y0;
 };
@@ -127,6 +127,7 @@ Luminances adaptSelected(const Tile& tile,
 void writeTile(const Tile& tile,
                const LuminancePatch& patch,
                const Luminances& adapted,
+               int top,
                Image<Rgb>& display)
 {
     const auto half = static_cast<std::size_t>(patch.width / 2);
@@ -134,7 +135,7 @@ void writeTile(const Tile& tile,
     std::vector<float> mapped(2 * half);
     std::vector<float> line;
     const int width = std::min(kTileWidth, tile.scene.width() - tile.x0);
-    const int height = std::min(kTileHeight, tile.scene.height() - tile.y0);
+    const int height = std::min(kTileHeight, top + display.height() - tile.y0);
     for (int y = 0; y < height; ++y) {
         std::copy_n(patch.even(y), half, luminances.data());
         std::copy_n(patch.odd(y), half, luminances.data() + half);
@@ -150,13 +151,14 @@ void writeTile(const Tile& tile,
                  result,
                  width,
                  line,
-                 display.row(tile.y0 + y).data() + tile.x0);
+                 display.row(tile.y0 + y - top).data() + tile.x0);
     }
 }
 
 void mapTile(const Tile& tile,
              const LocalAdaptation* local,
              const Importance* importance,
+             int top,
              Image<Rgb>& display)
 {
     const int halo = importance != nullptr ? importance->halo()
@@ -172,33 +174,37 @@ void mapTile(const Tile& tile,
                                 static_cast<std::size_t>(patch.height)]);
         local->adapt(patch, uniformBlocks(patch, 1), adapted.get());
     }
-    writeTile(tile, patch, adapted, display);
+    writeTile(tile, patch, adapted, top, display);
 }
 
 }  // namespace
 
-void mapTiles(const Image<Rgb>& scene,
-              const ToneCurve& curve,
-              const LocalAdaptation* local,
-              const Importance* importance,
-              Image<Rgb>& display,
-              Progress& progress)
+int TileMapping::reach() const
 {
-    INSITU_CHECK(display.sameSize(scene), "{}x{}", display.width(), display.height());
-    if (scene.empty()) return;
-    progress.checkpoint();
-    const int columns = (scene.width() + kTileWidth - 1) / kTileWidth;
-    const int rows = (scene.height() + kTileHeight - 1) / kTileHeight;
+    // Patches are filled up to multiples of 4.
+    constexpr int kFill = 3;
+    return std::max(importance_ != nullptr ? importance_->halo() : 0,
+                    local_ != nullptr ? local_->halo() : 0) +
+           kFill;
+}
+
+void TileMapping::map(const SceneStrip& strip,
+                      int top,
+                      Image<Rgb>& display,
+                      Progress& progress) const
+{
+    static_assert(kStripRows % kTileHeight == 0);
+    INSITU_CHECK(top % kTileHeight == 0, "row {}", top);
+    const int columns = (strip.width() + kTileWidth - 1) / kTileWidth;
+    const int rows = (display.height() + kTileHeight - 1) / kTileHeight;
     parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t tile) {
         if (progress.cancelled()) return;
-        const Tile part{scene,
-                        curve,
+        const Tile part{strip,
+                        *curve_,
                         static_cast<int>(tile % columns) * kTileWidth,
-                        static_cast<int>(tile / columns) * kTileHeight};
-        mapTile(part, local, importance, display);
+                        top + static_cast<int>(tile / columns) * kTileHeight};
+        mapTile(part, local_.get(), importance_, top, display);
     });
-    progress.checkpoint();
-    progress.report("tone mapping", 1.0);
 }
 
 }  // namespace insitu::tonemap

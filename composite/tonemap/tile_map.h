@@ -25,12 +25,26 @@ public:
 [[nodiscard]] WantedBlocks uniformBlocks(const LuminancePatch& patch, std::uint8_t wanted);
 
 /// Maps a picture tile by tile. `local` null: the global curve alone. `importance` null: the local
-/// part everywhere; else where it says, blended by its weights with the pixel's own luminance.
-void mapTiles(const Image<Rgb>& scene,
-              const ToneCurve& curve,
-              const LocalAdaptation* local,
-              const Importance* importance,
-              Image<Rgb>& display,
-              Progress& progress);
+/// part everywhere; else where it says (it must outlive this), blended by its weights with the
+/// pixel's own luminance.
+class TileMapping : public SceneMapping {
+public:
+    TileMapping(std::unique_ptr<ToneCurve> curve,
+                std::unique_ptr<LocalAdaptation> local,
+                const Importance* importance)
+        : curve_(std::move(curve)), local_(std::move(local)), importance_(importance)
+    {
+    }
+    [[nodiscard]] int reach() const override;
+    void map(const SceneStrip& strip,
+             int top,
+             Image<Rgb>& display,
+             Progress& progress) const override;
+
+private:
+    std::unique_ptr<ToneCurve> curve_;
+    std::unique_ptr<LocalAdaptation> local_;
+    const Importance* importance_;
+};
 
 }  // namespace insitu::tonemap

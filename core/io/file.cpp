@@ -29,27 +29,37 @@ std::vector<std::uint8_t> readFile(const fs::path& path, std::int64_t max_bytes)
     return bytes;
 }
 
-void writeAtomically(const fs::path& path, const std::function<void(const fs::path&)>& write)
+fs::path temporaryName(const fs::path& path)
 {
     static std::atomic<unsigned> counter{0};
-    const fs::path temporary = path.parent_path() / fmt::format(".{}.{}-{}{}",
-                                                                path.stem().string(),
-                                                                ::getpid(),
-                                                                counter.fetch_add(1),
-                                                                path.extension().string());
+    return path.parent_path() / fmt::format(".{}.{}-{}{}",
+                                            path.stem().string(),
+                                            ::getpid(),
+                                            counter.fetch_add(1),
+                                            path.extension().string());
+}
+
+void renameInPlace(const fs::path& temporary, const fs::path& path)
+{
     std::error_code error;
+    fs::rename(temporary, path, error);
+    if (!error) return;
+    const std::string cause = error.message();
+    fs::remove(temporary, error);
+    throw InputError(path.string(), "cannot be written: " + cause);
+}
+
+void writeAtomically(const fs::path& path, const std::function<void(const fs::path&)>& write)
+{
+    const fs::path temporary = temporaryName(path);
     try {
         write(temporary);
     } catch (...) {
+        std::error_code error;
         fs::remove(temporary, error);
         throw;
     }
-    fs::rename(temporary, path, error);
-    if (error) {
-        const std::string cause = error.message();
-        fs::remove(temporary, error);
-        throw InputError(path.string(), "cannot be written: " + cause);
-    }
+    renameInPlace(temporary, path);
 }
 
 void writeTextFile(const fs::path& path, std::string_view text)

@@ -17,6 +17,10 @@ namespace insitu {
 /// The temporary file is removed when `write` throws.
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path&)>& write);
+/// A name beside `path` that no other call gives, with the same extension.
+[[nodiscard]] std::filesystem::path temporaryName(const std::filesystem::path& path);
+/// Gives a temporary file its name; InputError, the file removed, when that fails.
+void renameInPlace(const std::filesystem::path& temporary, const std::filesystem::path& path);
 void writeTextFile(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace insitu

@@ -88,7 +88,7 @@ TEST(Ashikhmin, AllInstructionSetsGiveTheSameBits)
 {
     const Image<Rgb> scene = tone_scenes::room(157, 131);
     const LuminancePatch patch =
-        tonemap::readPatch(scene, 0, 0, 512, 256, tonemap::kNeighbourhoodHalo, 30.0f);
+        tonemap::readPatch(SceneStrip(scene), 0, 0, 512, 256, tonemap::kNeighbourhoodHalo, 30.0f);
     const WantedBlocks blocks{3, std::vector<std::uint8_t>(27, 1)};
     const auto adapted = [&](InstructionSet set) {
         std::vector<float> result(static_cast<std::size_t>(patch.width * patch.height));

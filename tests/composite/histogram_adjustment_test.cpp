@@ -62,11 +62,18 @@ TEST(EyeModel, RodsAndCones)
               3.0 * scotopicLuminance(ofLuminanceOne(Rgb(1.0f, 0.0f, 0.0f))));
 }
 
+Image<Rgb> fovealOf(const Image<Rgb>& scene, double field)
+{
+    tonemap::FovealImage foveal(scene.width(), scene.height(), field);
+    foveal.add(SceneStrip(scene));
+    return foveal.image();
+}
+
 TEST(FovealImage, HasAPixelADegreeAndKeepsTheMean)
 {
     const Image<Rgb> scene = tone_scenes::noise(640, 480, 3.0f);
     const double field = 60.0 * std::numbers::pi / 180.0;
-    const Image<Rgb> foveal = tonemap::fovealImage(scene, field);
+    const Image<Rgb> foveal = fovealOf(scene, field);
     EXPECT_EQ(foveal.width(), 66);  // 2 tan(30°) / 0.01745 = 66.2
     EXPECT_EQ(foveal.height(), 50);
     const auto meanOf = [](const Image<Rgb>& image) {
@@ -77,7 +84,7 @@ TEST(FovealImage, HasAPixelADegreeAndKeepsTheMean)
     };
     for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(meanOf(foveal)[c] / meanOf(scene)[c], 1.0, tolerance::kFloat);
-    EXPECT_EQ(tonemap::fovealImage(Image<Rgb>(3, 2, Rgb(1.0f)), field).width(), 3);
+    EXPECT_EQ(fovealOf(Image<Rgb>(3, 2, Rgb(1.0f)), field).width(), 3);
 }
 
 // Against the sum itself, weights cos(angle) / angle² over all other places.
@@ -108,7 +115,7 @@ TEST(AcuityPyramid, LevelsAreMeansAndBlendBetween)
     for (int y = 0; y < 8; ++y)
         for (int x = 0; x < 8; ++x)
             scene(x, y) = Rgb((x + y) % 2 == 0 ? 1.0f : 0.0f);
-    const tonemap::AcuityPyramid pyramid(scene, 3);
+    const tonemap::AcuityPyramid pyramid(SceneStrip(scene), 3);
     EXPECT_EQ(pyramid.sample(2, 2, 0.0f), Rgb(1.0f));
     EXPECT_NEAR(pyramid.sample(2, 2, 1.0f).g, 0.5, tolerance::kFloat);
     EXPECT_NEAR(pyramid.sample(2, 2, 0.5f).g, 0.75, tolerance::kFloat);
