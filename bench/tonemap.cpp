@@ -13,6 +13,7 @@
 // operator is also compared with its direct evaluation. The local operator is Ashikhmin's, or with
 // --reinhard Reinhard's.
 #include "composite/tonemap/ashikhmin.h"
+#include "composite/tonemap/frame_mapper.h"
 #include "composite/tonemap/histogram_adjustment.h"
 #include "composite/tonemap/reinhard.h"
 #include "composite/tonemap/selective.h"
@@ -220,6 +221,48 @@ void benchInserted(const BenchOptions& options,
                              local_seconds / seconds);
 }
 
+/// An object of that share that moves by a hundredth of the picture, frame after frame.
+void benchFrames(const BenchOptions& options,
+                 const Image<Rgb>& scene,
+                 const std::shared_ptr<const SeparableOperator>& tone_map,
+                 double local_seconds)
+{
+    Progress silent;
+    FrameMapper mapper(tone_map);
+    const double side = std::sqrt(options.inserted);
+    double seconds = 0.0;
+    double share = 0.0;
+    constexpr int kFrames = 12;
+    int counted = 0;
+    for (int frame = 0; frame < kFrames; ++frame) {
+        Image<Rgb> moved = scene;
+        const auto left = static_cast<int>((0.2 + 0.01 * frame) * scene.width());
+        const int top = scene.height() / 3;
+        for (int y = top; y < top + static_cast<int>(side * scene.height()); ++y)
+            for (int x = left; x < left + static_cast<int>(side * scene.width()); ++x)
+                moved(x, y) *= 0.8f;
+        const double start = processorSeconds();
+        (void)mapper.map(moved, 0.04, silent);
+        const double taken = processorSeconds() - start;
+        // The first frame, and those in which the look changes, are mapped whole.
+        if (mapper.mappedShare() == 1.0) continue;
+        seconds += taken;
+        share += mapper.mappedShare();
+        ++counted;
+    }
+    if (counted == 0) return;
+    std::cout << fmt::format(
+        "  moved object of {:.1f} %: {:.1f} % of the pixels anew, {:.1f} ms a frame with "
+        "statistics "
+        "in {} of {} frames, {:.2f} times LTM\n",
+        100.0 * options.inserted,
+        100.0 * share / counted,
+        1e3 * seconds / counted,
+        counted,
+        kFrames,
+        local_seconds * counted / seconds);
+}
+
 void benchHistogram(const BenchOptions& options, const std::string& argument)
 {
     Progress silent;
@@ -306,6 +349,7 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
     if (scene.pixelCount() < 3'000'000 && !options.reinhard) compareWithDirect(scene, ltm);
     if (options.inserted > 0.0)
         benchInserted(options, scene, statistics, operator_whole, local_seconds);
+    if (options.inserted > 0.0) benchFrames(options, scene, operator_whole, local_seconds);
     std::cout << std::flush;
     if (!options.saliency) return;
     SelectiveOptions by_map = selection;

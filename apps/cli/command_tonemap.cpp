@@ -1,5 +1,6 @@
 #include "apps/cli/command.h"
 #include "apps/cli/tonemap_options.h"
+#include "composite/tonemap/frame_mapper.h"
 #include "composite/tonemap/strips.h"
 #include "core/io/encoded_rows.h"
 #include "core/io/radiance_rows.h"
@@ -20,6 +21,8 @@ struct TonemapArguments {
     fs::path output;
     TonemapOptions tone;
     bool same_curve = false;
+    double frames_per_second = 0.0;  ///< 0: no film
+    AdaptationOptions adaptation;
     int bits = 8;
 };
 
@@ -83,8 +86,9 @@ void mapPicture(RadianceRows& rows,
 void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Context& context)
 {
     context.start();
-    if (arguments.same_curve && !arguments.tone.sharesCurves())
-        throw CLI::ValidationError("--same-curve",
+    if ((arguments.same_curve || arguments.frames_per_second > 0.0) &&
+        !arguments.tone.sharesCurves())
+        throw CLI::ValidationError(arguments.same_curve ? "--same-curve" : "--frames-per-second",
                                    "operator " + arguments.tone.name() +
                                        " makes its curve from each picture alone; leave one of "
                                        "the two out");
@@ -98,11 +102,16 @@ void runTonemap(const TonemapArguments& arguments, const CLI::App& command, Cont
     const auto tone_map = arguments.tone.make(command);
     SceneStatistics common;
     if (arguments.same_curve) common = commonStatistics(arguments.inputs, context.progress());
+    const bool film = arguments.frames_per_second > 0.0;
+    AdaptationSmoother smoother(arguments.adaptation);
     for (std::size_t i = 0; i < outputs.size(); ++i) {
         const auto rows = openPicture(arguments.inputs[i]);
+        SceneStatistics statistics =
+            arguments.same_curve ? common : measureRows(*rows, context.progress());
+        if (film) statistics = smoother.next(statistics, 1.0 / arguments.frames_per_second);
         mapPicture(*rows,
                    *tone_map,
-                   arguments.same_curve ? common : measureRows(*rows, context.progress()),
+                   statistics,
                    outputs[i],
                    arguments.bits == 16 ? 65535 : 255,
                    context.progress());
@@ -127,6 +136,20 @@ void registerTonemap(CLI::App& app, Context& context)
     command->add_flag("--same-curve",
                       arguments->same_curve,
                       "One curve for all inputs, made from all of them: the same look");
+    command
+        ->add_option("--frames-per-second",
+                     arguments->frames_per_second,
+                     "The inputs are the frames of a film, in order: the look follows them "
+                     "without jumps and flicker")
+        ->check(CLI::PositiveNumber)
+        ->excludes("--same-curve");
+    command
+        ->add_option("--adaptation-seconds",
+                     arguments->adaptation.time_constant_s,
+                     "Time after which the look has followed 63 % of a change")
+        ->check(CLI::NonNegativeNumber)
+        ->needs("--frames-per-second")
+        ->capture_default_str();
     command->add_option("--bits", arguments->bits, "Bits per channel (16: .png only)")
         ->check(CLI::IsMember({8, 16}))
         ->capture_default_str();
@@ -137,7 +160,8 @@ void registerTonemap(CLI::App& app, Context& context)
         "  insitu tonemap room.exr -o room.png --operator ashikhmin\n"
         "  insitu tonemap night.exr -o night.png --key 0.09 --white 3\n"
         "  insitu tonemap night.exr -o night.png --operator histogram --scene-white-cd-m2 0.1\n"
-        "  insitu tonemap *.exr -o pictures/ --same-curve");
+        "  insitu tonemap *.exr -o pictures/ --same-curve\n"
+        "  insitu tonemap frame_*.exr -o film/ --frames-per-second 25");
     command->callback(
         [arguments, command, &context] { runTonemap(*arguments, *command, context); });
 }

@@ -9,6 +9,14 @@
 
 namespace insitu {
 
+/// A part of a picture, pixels; its corner at multiples of kGrid.
+struct PixelBox {
+    static constexpr int kGrid = 64;
+
+    int left = 0, top = 0;
+    int width = 0, height = 0;  ///< multiples of kGrid, but at the picture's border
+};
+
 /// An operator at work on one scene, strip by strip.
 ///
 /// First come the passes that gather, each over all of the scene: strips from the top, without
@@ -37,6 +45,17 @@ public:
                      int top,
                      Image<Rgb>& display,
                      Progress& progress) const = 0;
+
+    /// Whether parts can be mapped by themselves: what a pixel becomes depends on the statistics
+    /// and on what lies within reach() pixels around it, not on what was gathered.
+    [[nodiscard]] virtual bool mapsBoxes() const { return false; }
+    /// Maps one box of the whole scene into the whole display. Thread-safe for boxes that do not
+    /// overlap.
+    virtual void mapBox(const SceneStrip& /*whole*/,
+                        const PixelBox& /*box*/,
+                        Image<Rgb>& /*display*/) const
+    {
+    }
 };
 
 /// A tone mapping operator: scene-linear radiance to what a display can show, for *viewing* HDR

@@ -57,7 +57,7 @@ using Luminances = std::unique_ptr<float[]>;
 struct Tile {
     const SceneStrip& scene;
     const ToneCurve& curve;
-    int x0, y0;
+    PixelBox box;
 };
 
 /// Blends the local part in, where it is wanted; only there the picture is read as far around as
@@ -74,8 +74,8 @@ void blendLocal(const Tile& tile,
     const int top = box.top * WantedBlocks::kHeight;
     const LuminancePatch part =
         readPatch(tile.scene,
-                  tile.x0 + left,
-                  tile.y0 + top,
+                  tile.box.left + left,
+                  tile.box.top + top,
                   std::min(box.right * WantedBlocks::kWidth, patch.width) - left,
                   std::min(box.bottom * WantedBlocks::kHeight, patch.height) - top,
                   local.halo(),
@@ -118,7 +118,7 @@ Luminances adaptSelected(const Tile& tile,
     }
     std::vector<float> weights(pixels, 0.0f);
     const WantedBlocks blocks =
-        importance.weigh(patch, tile.curve, tile.x0, tile.y0, weights.data());
+        importance.weigh(patch, tile.curve, tile.box.left, tile.box.top, weights.data());
     if (blocks.any()) blendLocal(tile, patch, local, blocks, weights, adapted.get());
     return adapted;
 }
@@ -134,9 +134,7 @@ void writeTile(const Tile& tile,
     std::vector<float> luminances(2 * half);
     std::vector<float> mapped(2 * half);
     std::vector<float> line;
-    const int width = std::min(kTileWidth, tile.scene.width() - tile.x0);
-    const int height = std::min(kTileHeight, top + display.height() - tile.y0);
-    for (int y = 0; y < height; ++y) {
+    for (int y = 0; y < tile.box.height; ++y) {
         std::copy_n(patch.even(y), half, luminances.data());
         std::copy_n(patch.odd(y), half, luminances.data() + half);
         const float* const adaptation =
@@ -147,11 +145,11 @@ void writeTile(const Tile& tile,
                                mapped.data(),
                                tile.curve.scale(),
                                static_cast<std::ptrdiff_t>(half)};
-        writeRow(tile.scene.row(tile.y0 + y).data() + tile.x0,
+        writeRow(tile.scene.row(tile.box.top + y).data() + tile.box.left,
                  result,
-                 width,
+                 tile.box.width,
                  line,
-                 display.row(tile.y0 + y - top).data() + tile.x0);
+                 display.row(tile.box.top + y - top).data() + tile.box.left);
     }
 }
 
@@ -164,8 +162,13 @@ void mapTile(const Tile& tile,
     const int halo = importance != nullptr ? importance->halo()
                      : local != nullptr    ? local->halo()
                                            : 0;
-    const LuminancePatch patch =
-        readPatch(tile.scene, tile.x0, tile.y0, kTileWidth, kTileHeight, halo, tile.curve.scale());
+    const LuminancePatch patch = readPatch(tile.scene,
+                                           tile.box.left,
+                                           tile.box.top,
+                                           tile.box.width,
+                                           tile.box.height,
+                                           halo,
+                                           tile.curve.scale());
     Luminances adapted;
     if (local != nullptr && importance != nullptr) {
         adapted = adaptSelected(tile, patch, *local, *importance);
@@ -199,12 +202,21 @@ void TileMapping::map(const SceneStrip& strip,
     const int rows = (display.height() + kTileHeight - 1) / kTileHeight;
     parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t tile) {
         if (progress.cancelled()) return;
+        const int left = static_cast<int>(tile % columns) * kTileWidth;
+        const int row = top + static_cast<int>(tile / columns) * kTileHeight;
         const Tile part{strip,
                         *curve_,
-                        static_cast<int>(tile % columns) * kTileWidth,
-                        top + static_cast<int>(tile / columns) * kTileHeight};
+                        {left,
+                         row,
+                         std::min(kTileWidth, strip.width() - left),
+                         std::min(kTileHeight, top + display.height() - row)}};
         mapTile(part, local_.get(), importance_, top, display);
     });
+}
+
+void TileMapping::mapBox(const SceneStrip& whole, const PixelBox& box, Image<Rgb>& display) const
+{
+    mapTile({whole, *curve_, box}, local_.get(), importance_, 0, display);
 }
 
 }  // namespace insitu::tonemap

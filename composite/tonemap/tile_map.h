@@ -40,6 +40,8 @@ public:
              int top,
              Image<Rgb>& display,
              Progress& progress) const override;
+    [[nodiscard]] bool mapsBoxes() const override { return true; }
+    void mapBox(const SceneStrip& whole, const PixelBox& box, Image<Rgb>& display) const override;
 
 private:
     std::unique_ptr<ToneCurve> curve_;

@@ -226,6 +226,42 @@ TEST(Tonemap, HasTheOperatorsThatItNames)
     EXPECT_THAT(shared.messages, HasSubstr("durand"));
 }
 
+// The light goes up twentyfold from one frame to the next: the look follows later.
+TEST(Tonemap, FramesOfAFilmFollowTheLightSlowly)
+{
+    const TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "film");
+    writeRadiance(folder / "a.exr", Image<Rgb>(16, 16, Rgb(1.0f)));
+    writeRadiance(folder / "b.exr", Image<Rgb>(16, 16, Rgb(20.0f)));
+    const auto secondFrame = [&](std::vector<std::string> more) {
+        std::vector<std::string> arguments = {"tonemap",
+                                              (folder / "a.exr").string(),
+                                              (folder / "b.exr").string(),
+                                              "-o",
+                                              (folder / "film").string(),
+                                              "--force"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const ProgramRun run = runProgram(arguments);
+        EXPECT_EQ(run.exit_code, kDone) << run.messages;
+        return readPhoto(folder / "film" / "b.png").image.codes(3, 3).g;
+    };
+    const int by_itself = secondFrame({"--white", "1e6"});
+    const int slowly = secondFrame({"--white", "1e6", "--frames-per-second", "25"});
+    const int at_once =
+        secondFrame({"--white", "1e6", "--frames-per-second", "25", "--adaptation-seconds", "0"});
+    EXPECT_EQ(at_once, by_itself);
+    EXPECT_GT(slowly, by_itself + 50);
+    EXPECT_EQ(runProgram({"tonemap",
+                          (folder / "a.exr").string(),
+                          "-o",
+                          (folder / "film").string(),
+                          "--same-curve",
+                          "--frames-per-second",
+                          "25"})
+                  .exit_code,
+              kWrongUsage);
+}
+
 TEST(Compare, JudgesEncodedPicturesAsTheyAreSeen)
 {
     const TemporaryFolder folder;
