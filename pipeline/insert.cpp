@@ -228,7 +228,7 @@ InsertResult insertObjects(const Project& given, const InsertOptions& options, P
     bool from_cache = false;
     result.light = cachedLight(project, proxy, camera, options, cache, from_cache);
     append(result.findings, result.light.findings);
-    choosePhotoResponse(project, result);
+    choosePhotoResponse(project, proxy, result);
     watch.lap("probe", from_cache);
 
     const glm::dmat3 primaries = result.photo.metadata.color.rec709_from_linear;

@@ -2,6 +2,7 @@
 
 #include "core/color.h"
 #include "core/quantile.h"
+#include "pipeline/common_surfaces.h"
 
 #include <fmt/format.h>
 
@@ -16,8 +17,6 @@ namespace insitu {
 namespace {
 
 constexpr std::size_t kMinPixels = 100;
-/// Pixels that are compared, about: enough for medians.
-constexpr double kPixels = 60000.0;
 /// Darker than this share of the clipping limit noise and black level matter.
 constexpr double kDark = 0.02;
 /// Colour is off when it differs by more than this, as a logarithm: rooms with equal balance show
@@ -89,30 +88,16 @@ PhotoBalance measurePhotoBalance(const Image<Rgb>& radiance,
                                  const EnvironmentMap& probe,
                                  glm::dvec3 probe_center_m)
 {
-    const int stride = std::max(
-        1, static_cast<int>(std::sqrt(static_cast<double>(radiance.pixelCount()) / kPixels)));
     Ratios all;
     std::map<std::size_t, Ratios> faces;
-    for (int y = stride / 2; y < radiance.height(); y += stride)
-        for (int x = stride / 2; x < radiance.width(); x += stride) {
-            const Rgb taken = radiance(x, y);
-            const glm::dvec3 share = glm::dvec3(taken) / clip;
-            const double brightest = std::max({share.r, share.g, share.b});
-            if (!(brightest < 0.95 && brightest > kDark)) continue;
-            const auto hit =
-                proxy.intersect(camera.position_m, camera.rayDirection({x + 0.5, y + 0.5}));
-            if (!hit || hit->opening || proxy.faces()[hit->face].solid) continue;
-            const glm::dvec3 way = hit->point - probe_center_m;
-            const ProxyFace& face = proxy.faces()[hit->face];
-            if ((!face.two_sided && glm::dot(way, face.normal) >= 0.0) ||
-                !proxy.mutuallyVisible(probe_center_m, hit->point))
-                continue;
-            const glm::dvec3 direction = glm::normalize(way);
-            const Rgb seen = lookUp(probe, direction);
-            if (!(luminance(seen) > 0.0f) || lookUpClipped(probe, direction) != Rgb(0.0f)) continue;
-            addRatios(taken, seen, all);
-            addRatios(taken, seen, faces[hit->face]);
-        }
+    for (const CommonPixel& common : commonPixels(camera, proxy, probe, probe_center_m)) {
+        const Rgb taken = radiance(common.pixel.x, common.pixel.y);
+        const glm::dvec3 share = glm::dvec3(taken) / clip;
+        const double brightest = std::max({share.r, share.g, share.b});
+        if (!(brightest < 0.95 && brightest > kDark)) continue;
+        addRatios(taken, common.seen, all);
+        addRatios(taken, common.seen, faces[common.face]);
+    }
     PhotoBalance balance;
     if (all[3].size() < kMinPixels) return balance;
     balance.pixels = all[3].size();

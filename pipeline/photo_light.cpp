@@ -1,6 +1,8 @@
 #include "pipeline/photo_light.h"
 
+#include "pipeline/common_surfaces.h"
 #include "pipeline/photo_balance.h"
+#include "pipeline/photo_response.h"
 #include "pipeline/reference_capture.h"
 
 #include <fmt/format.h>
@@ -30,9 +32,79 @@ ResponseCurve scaledAtMiddle(ResponseCurve curve)
     return curve;
 }
 
+/// Why the photograph's response is not known.
+std::string unknownResponse(const InsertResult& result)
+{
+    const PhotoMetadata& photo = result.photo.metadata;
+    const PhotoMetadata& probe = result.light.metadata;
+    if (!result.light.response_known)
+        return "no response was recovered for the photograph's camera";
+    return fmt::format(
+        "the photograph is from '{} {}' in '{}', the light probe from '{} {}' in "
+        "'{}'",
+        photo.make,
+        photo.model,
+        photo.color.name,
+        probe.make,
+        probe.model,
+        probe.color.name);
+}
+
+/// The profile's curve, or what surfaces of known radiance say against it.
+void assumeResponse(const SceneProxy& proxy, InsertResult& result)
+{
+    const PhotoMetadata& photo = result.photo.metadata;
+    result.photo_response = scaledAtMiddle(photo.color.transfer);
+    std::string told = "nothing else tells it";
+    // Radiance by an assumed curve would only find that curve again; an environment's file holds
+    // radiance.
+    const bool radiance_known = result.light.response_known || result.light.metadata.make.empty();
+    if (radiance_known && photo.color.hasRec709Primaries()) {
+        const PhotoResponseEstimate estimate = estimatePhotoResponse(
+            result.photo.image,
+            result.photo_response,
+            commonPixels(
+                result.camera.camera, proxy, result.light.environment, result.light.center_m));
+        if (estimate.differs) {
+            result.photo_response = estimate.curve;
+            result.findings.push_back(
+                {Severity::Warning,
+                 "photo-response-estimated",
+                 fmt::format("{}: from {} pixels of surfaces that the light probe sees too, its "
+                             "response is {} to the power {:.3f} ± {:.3f}{}; they then agree "
+                             "within {:.1f} % instead of {:.1f} %",
+                             unknownResponse(result),
+                             estimate.pixels,
+                             photo.color.transfer.source,
+                             estimate.power,
+                             estimate.power_sigma,
+                             estimate.bend != 0.0 ? fmt::format(", bent by {:.3f} ± {:.3f}",
+                                                                estimate.bend,
+                                                                estimate.bend_sigma)
+                                                  : "",
+                             100.0 * estimate.spread,
+                             100.0 * estimate.spread_assumed)});
+            return;
+        }
+        told = estimate.power_sigma > 0.0
+                   ? fmt::format(
+                         "surfaces that the light probe sees too do not contradict it "
+                         "(power {:.3f} ± {:.3f})",
+                         estimate.power,
+                         estimate.power_sigma)
+                   : "too few surfaces are seen by the light probe too to tell";
+    }
+    result.findings.push_back({Severity::Warning,
+                               "photo-response-assumed-srgb",
+                               fmt::format("{}: its response is assumed to be {}; {}",
+                                           unknownResponse(result),
+                                           photo.color.transfer.source,
+                                           told)});
+}
+
 }  // namespace
 
-void choosePhotoResponse(const Project& project, InsertResult& result)
+void choosePhotoResponse(const Project& project, const SceneProxy& proxy, InsertResult& result)
 {
     const PhotoMetadata& photo = result.photo.metadata;
     if (!result.photo.radiance.empty()) {
@@ -55,23 +127,7 @@ void choosePhotoResponse(const Project& project, InsertResult& result)
     } else if (result.light.response_known && same_camera && sameColors(photo.color, probe.color)) {
         result.photo_response = result.light.response;
     } else {
-        result.photo_response = scaledAtMiddle(photo.color.transfer);
-        result.findings.push_back(
-            {Severity::Warning,
-             "photo-response-assumed-srgb",
-             !result.light.response_known
-                 ? fmt::format("no response was recovered for the photograph's camera: it is "
-                               "assumed to be {}",
-                               photo.color.transfer.source)
-                 : fmt::format("the photograph is from '{} {}' in '{}', the light probe from '{} "
-                               "{}' in '{}': the photograph's response is assumed to be {}",
-                               photo.make,
-                               photo.model,
-                               photo.color.name,
-                               probe.make,
-                               probe.model,
-                               probe.color.name,
-                               photo.color.transfer.source)});
+        assumeResponse(proxy, result);
     }
     const auto relative = exposure.relative();
     if (!relative && result.light.radiance_unit_known)

@@ -16,9 +16,10 @@ namespace insitu {
 
 /// The photograph is a single exposure: its response is the probe's when one camera took both. Or
 /// it holds radiance, in a unit of its own.
-/// Findings: "photo-response-assumed-srgb". InputError: no exposure time where the probe's is
-/// known, or one of an HDR photograph.
-void choosePhotoResponse(const Project& project, InsertResult& result);
+/// Else it is the picture's profile's, unless surfaces that the probe sees too tell another one.
+/// Findings: "photo-response-assumed-srgb", "photo-response-estimated". InputError: no exposure
+/// time where the probe's is known, or one of an HDR photograph.
+void choosePhotoResponse(const Project& project, const SceneProxy& proxy, InsertResult& result);
 
 /// The photograph's light, and the same in the light probe's exposure and white balance for the
 /// stages that make the room's light from both: nothing where their units cannot be compared.

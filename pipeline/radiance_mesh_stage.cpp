@@ -23,7 +23,7 @@ ProjectRadianceMesh projectRadianceMesh(const Project& given,
     append(result.findings, proxy.findings());
     result.light = captureLight(project, proxy, result.camera.camera, options);
     append(result.findings, result.light.findings);
-    choosePhotoResponse(project, result);
+    choosePhotoResponse(project, proxy, result);
     const std::optional<PhotographedRadiance> photographed =
         photoLight(project, proxy, result.photo.metadata.color.rec709_from_linear, result)
             .in_probe_unit;
