@@ -187,9 +187,9 @@ PhotoResponseEstimate estimatePhotoResponse(const EncodedImage& photo,
                        std::abs(estimate.bend) * std::max(-low, high) > kLeastOff;
     if (!bends) rises = judge(false);
     const double off = std::abs(estimate.power - 1.0);
-    estimate.differs = rises &&
-                       (bends || (off > kLeastOff && off > kSigmas * estimate.power_sigma)) &&
-                       estimate.spread < estimate.spread_assumed;
+    estimate.differs =
+        rises && (bends || (off > kLeastOff && off > kSigmas * estimate.power_sigma)) &&
+        estimate.spread < kLargestSpread && estimate.spread < kSpreadGain * estimate.spread_assumed;
     if (estimate.differs) estimate.curve = bent(assumed, estimate.power, estimate.bend, low, high);
     return estimate;
 }
