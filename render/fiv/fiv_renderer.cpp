@@ -85,6 +85,7 @@ FivScene makeScene(const RoomLight& room,
                    fiv.light,
                    room.cellIrradiance(),
                    {},
+                   {},
                    {}};
     result.table_seconds = secondsSince(start);
     result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
@@ -111,6 +112,7 @@ void lightEachOther(FivScene& scene,
         places.push_back(ObjectShading::placeOf(sample.point));
         places.back().normal = sample.point.geometric_normal;
     }
+    scene.bounce = ObjectBounce(scene.objects, samples);
     for (int round = 0; round < 3; ++round) {
         if (round == 2) scene.room_change = roomChange(scene, receivers);
         if (round > 0) shading.update(/*room_too=*/round == 2);

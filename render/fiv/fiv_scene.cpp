@@ -22,7 +22,7 @@ LookOptions FivScene::limitsTowardObjects(glm::dvec3 place,
     return limits;
 }
 
-CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light)
+CellRadiance lightOfCells(const FivScene& scene, const PlaceLight& light, bool less_glow)
 {
     const std::size_t pairs = scene.coarse.cells().pairCount();
     CellRadiance hideable{
@@ -31,9 +31,14 @@ CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light)
         hideable.solid_angles[pair] = light.geometry->solid_angles[2 * pair];
     for (std::size_t cell = 0; cell < light.radiance.size(); ++cell)
         (cell % 2 == 0 ? hideable.along : hideable.against)[cell / 2] =
-            light.geometry->solid_angles[cell] *
-            (light.radiance[cell] + light.change[cell] - scene.glow[cell]);
+            light.geometry->solid_angles[cell] * (light.radiance[cell] + light.change[cell] -
+                                                  (less_glow ? scene.glow[cell] : Rgb(0.0f)));
     return hideable;
+}
+
+CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light)
+{
+    return lightOfCells(scene, light, /*less_glow=*/true);
 }
 
 }  // namespace insitu

@@ -4,6 +4,7 @@
 #include "lighting/light_spots.h"
 #include "lighting/place_light.h"
 #include "lighting/visibility_atlas.h"
+#include "render/fiv/object_bounce.h"
 #include "render/fiv/object_glow.h"
 #include "render/object_scene.h"
 #include "render/renderer.h"
@@ -28,7 +29,8 @@ struct FivScene {
     /// cell of `coarse`, number 2·pair + side as in PlaceLight. What hides light sends this
     /// instead.
     std::vector<Rgb> glow;
-    ObjectGlow near;  ///< what of that is different close to the objects
+    ObjectGlow near;      ///< what of that is different close to the objects
+    ObjectBounce bounce;  ///< and what they show themselves and each other
 
     [[nodiscard]] const LocalFrame& frame() const { return coarse.silhouettes.local; }
     [[nodiscard]] Rgb glowAlong(glm::dvec3 direction) const
@@ -59,6 +61,11 @@ struct FivScene {
     }
 };
 
+/// The light at a place, cell by cell of the scene's coarse atlas, whose cells `light` has; less
+/// what the objects themselves send along it, where asked.
+[[nodiscard]] CellRadiance lightOfCells(const FivScene& scene,
+                                        const PlaceLight& light,
+                                        bool less_glow);
 /// The light at a place less the objects' own: what they take from a surface when they hide it.
 /// `light` has the cells of the scene's coarse atlas.
 [[nodiscard]] CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light);

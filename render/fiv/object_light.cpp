@@ -121,7 +121,7 @@ void ObjectShading::update(bool room_too)
             });
         }
     }
-    hideable_ = hideableLight(scene_, mean_);
+    hideable_ = lightOfCells(scene_, mean_, /*less_glow=*/false);
 }
 
 void ObjectShading::lookFromNodes(double spacing_m)
@@ -248,7 +248,7 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
     std::vector<Received> result(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         const Rgb all = mean_irradiance_.lookUp(places[i].normal);
-        const Rgb sent = lost[i].sky * scene_.near.excess(places[i].position, places[i].normal);
+        const Rgb sent = lost[i].sky * scene_.bounce.at(places[i].position, places[i].normal);
         const Rgb left = glm::max(all - lost[i].light + sent, Rgb(0.0f));
         const Rgb open = openIrradiance(places[i]);
         Received& r = result[i];

@@ -83,10 +83,14 @@ void setGlow(FivScene& scene,
     }
     std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
     ObjectGlow near;
+    // What lies deep in a hollow, or inside, hardly shows to what is outside.
     for (std::size_t i = 0; i < samples.size(); ++i)
-        near.add(
-            samples[i].point.position, samples[i].point.geometric_normal, samples[i].area, sent[i]);
+        near.add(samples[i].point.position,
+                 samples[i].point.geometric_normal,
+                 samples[i].area * static_cast<double>(scene.bounce.open(i)),
+                 sent[i]);
     scene.near = std::move(near);
+    scene.bounce.update(sent);
     parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
         const std::size_t pair = static_cast<std::size_t>(number);
         glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
