@@ -24,6 +24,14 @@ INSITU_KERNEL void accumulateAll(const float* flux, Projected& p, Block& block)
     }
 }
 
+/// A direction's numbers; null where no direction has any.
+INSITU_KERNEL const float* fluxOf(const std::vector<float>& flux,
+                                  std::size_t direction,
+                                  std::size_t numbers)
+{
+    return flux.empty() ? nullptr : flux.data() + direction * numbers;
+}
+
 /// Whether light may fall on the front of any surface whose normal lies within the bounds.
 INSITU_KERNEL bool mayFallOn(const NormalBounds& bounds, const float* vector)
 {
@@ -64,8 +72,8 @@ INSITU_KERNEL void sumDirections(const Source& source, float bias, Group& group)
     Projected p;
     Concerns found;
     for (std::size_t direction = 0; direction < source.shines.size(); ++direction) {
-        const float* const along = source.along.data() + direction * kNumbers;
-        const float* const against = source.against.data() + direction * kNumbers;
+        const float* const along = fluxOf(source.along, direction, kNumbers);
+        const float* const against = fluxOf(source.against, direction, kNumbers);
         const std::uint32_t shines =
             litSides<kSum>(source.shines[direction], group.all_normals, along, against);
         if (shines == 0) continue;
@@ -154,8 +162,8 @@ INSITU_KERNEL void sumUnion(const Source& light,
     Concerns found;
     const auto left = std::make_unique<Left>();
     for (std::size_t direction = 0; direction < light.shines.size(); ++direction) {
-        const float* const along = light.along.data() + direction * kNumbers;
-        const float* const against = light.against.data() + direction * kNumbers;
+        const float* const along = fluxOf(light.along, direction, kNumbers);
+        const float* const against = fluxOf(light.against, direction, kNumbers);
         const std::uint32_t shines =
             litSides<kSum>(light.shines[direction], groups[0].all_normals, along, against);
         if (shines == 0) continue;
