@@ -15,6 +15,7 @@
 #include "core/io/model_io.h"
 #include "core/random.h"
 #include "lighting/environment_light.h"
+#include "lighting/hidden_picture.h"
 
 #include <CLI/CLI.hpp>
 
@@ -45,24 +46,32 @@ void subdivide(TriangleMesh& mesh, std::size_t triangles)
     mesh.material_of.assign(mesh.triangles.size(), 0);
 }
 
-/// Floor places of the frame in tiles of 8 x 4 pixels, in the model's units.
-std::vector<glm::dvec3> framePlaces(const LocalFrame& local, double floor_y)
+/// Calls visit(x, y) in tiles of 8 x 4 pixels.
+template <class Visit>
+void forEachPixel(const Visit& visit)
 {
-    std::vector<glm::dvec3> places;
     for (int top = 0; top < kHeight; top += 4)
         for (int left = 0; left < kWidth; left += 8)
             for (int y = top; y < top + 4; ++y)
-                for (int x = left; x < left + 8; ++x) {
-                    // Looking down 35 degrees from 6 radii away.
-                    const double u = (x + 0.5 - 0.5 * kWidth) / kWidth;
-                    const double v = (y + 0.5 - 0.5 * kHeight) / kWidth;
-                    const double down = std::sin(0.61) + v * std::cos(0.61);
-                    const double ahead = std::cos(0.61) - v * std::sin(0.61);
-                    const double t = 3.5 / std::max(down, 0.05);
-                    const glm::dvec3 from_center(u * t, 0.0, ahead * t - 5.0);
-                    places.push_back(local.center + local.radius * from_center);
-                    places.back().y = floor_y;
-                }
+                for (int x = left; x < left + 8; ++x)
+                    visit(x, y);
+}
+
+/// Floor places of the frame, in the model's units.
+std::vector<glm::dvec3> framePlaces(const LocalFrame& local, double floor_y)
+{
+    std::vector<glm::dvec3> places;
+    forEachPixel([&](int x, int y) {
+        // Looking down 35 degrees from 6 radii away.
+        const double u = (x + 0.5 - 0.5 * kWidth) / kWidth;
+        const double v = (y + 0.5 - 0.5 * kHeight) / kWidth;
+        const double down = std::sin(0.61) + v * std::cos(0.61);
+        const double ahead = std::cos(0.61) - v * std::sin(0.61);
+        const double t = 3.5 / std::max(down, 0.05);
+        const glm::dvec3 from_center(u * t, 0.0, ahead * t - 5.0);
+        places.push_back(local.center + local.radius * from_center);
+        places.back().y = floor_y;
+    });
     return places;
 }
 
@@ -76,6 +85,13 @@ public:
         for (const glm::dvec3 place : places_)
             local_.push_back(stage.local().localFrom(place));
         hidden_.resize(places_.size());
+        rows_.resize(places_.size());
+        row_by_row_.resize(places_.size());
+        forEachPixel([&](int x, int y) {
+            const auto at = static_cast<std::size_t>(y * kWidth + x);
+            row_by_row_[at] = local_[row_of_.size()];
+            row_of_.push_back(at);
+        });
     }
 
     void run()
@@ -87,6 +103,8 @@ public:
         report::Table::printHead();
         for (const int fine : {0, 16, 48})
             exact(fine);
+        for (const double max_error : {0.01, 0.03})
+            ofPicture(max_error);
         plane(object);
         shells(object);
         for (const int samples : {4, 16, 64, 256, 1024})
@@ -191,6 +209,26 @@ private:
             stage_.atlas.silhouettes.memoryBytes(),
             errorOf([&](std::size_t i) { return free - hidden_[pixels_[i]]; }));
     }
+    /// A part of the pixels, interpolated in between: a frame while the object is moved.
+    void ofPicture(double max_error)
+    {
+        const Stopwatch lighting;
+        const ObjectLight object = lit({.max_fine_directions = 16});
+        const double before = lighting.passed().processor;
+        double share = 0.0;
+        const auto shade = report::fastest(3, [&] { share = frameOf(object, max_error); });
+        const Rgb free = freeIrradiance(object.light, kUp);
+        add(fmt::format("ours, {:.0f} % of the pixels", 100.0 * share),
+            before,
+            shade,
+            stage_.atlas.silhouettes.memoryBytes(),
+            errorOf([&](std::size_t i) { return free - rows_[row_of_[pixels_[i]]]; }));
+    }
+    double frameOf(const ObjectLight& object, double max_error)
+    {
+        return hiddenIrradianceOfPicture(
+            object, kWidth, kHeight, row_by_row_, kUp, {.max_error = max_error}, rows_);
+    }
     void plane(const ObjectLight& object)
     {
         const double extent = 16.0 * stage_.local().radius;
@@ -260,7 +298,7 @@ private:
             0,
             errorOf([&](std::size_t i) { return shown[i]; }));
     }
-    /// A turned object is the same atlas in another light.
+    /// A turned object is the same atlas in another light; a moved one in the same.
     void turned()
     {
         const double angle = 0.3;
@@ -272,6 +310,18 @@ private:
             hiddenIrradiance(object, local_, kUp, hidden_);
         });
         add("ours, turned: light, silhouettes, frame", 0.0, spent, 0, -1.0);
+        Stopwatch::Seconds light, frame;
+        const auto in_part = report::fastest(3, [&] {
+            const Stopwatch lighting;
+            const ObjectLight object = lit({.max_fine_directions = 16}, object_from_world);
+            light = lighting.passed();
+            const Stopwatch shading;
+            (void)frameOf(object, 0.01);
+            frame = shading.passed();
+        });
+        add("ours, turned, part of the pixels", 0.0, in_part, 0, -1.0);
+        add("  of it light and silhouettes", 0.0, light, 0, -1.0);
+        add("  of it the frame", 0.0, frame, 0, -1.0);
     }
 
     Stage& stage_;
@@ -279,6 +329,9 @@ private:
     std::vector<glm::dvec3> places_;
     std::vector<glm::vec3> local_;
     std::vector<Rgb> hidden_;
+    std::vector<glm::vec3> row_by_row_;  ///< `local_` as a picture
+    std::vector<Rgb> rows_;
+    std::vector<std::size_t> row_of_;  ///< where in the picture a place is
     std::vector<std::size_t> pixels_;
     std::vector<Rgb> truth_;
     report::Table table_;

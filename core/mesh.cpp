@@ -18,6 +18,14 @@ glm::dvec3 rotateY(glm::dvec3 v, double angle_rad)
 
 }  // namespace
 
+glm::vec2 texcoordAt(const TriangleMesh& mesh, std::uint32_t triangle, glm::vec2 barycentric)
+{
+    if (mesh.texcoords.empty()) return glm::vec2(0.0f);
+    const glm::uvec3 corner = mesh.triangles[triangle];
+    return mesh.texcoords[corner.x] * (1.0f - barycentric.x - barycentric.y) +
+           mesh.texcoords[corner.y] * barycentric.x + mesh.texcoords[corner.z] * barycentric.y;
+}
+
 BoundingBox boundingBox(const TriangleMesh& mesh)
 {
     if (mesh.positions.empty()) return {};
@@ -47,6 +55,13 @@ glm::dvec3 Placement::apply(glm::dvec3 x_in_model) const
     return position_m + rotateY(scale * (x_in_model - pivot_in_model), rotation_y_rad);
 }
 
+glm::dmat3 Placement::worldFromModelRotation() const
+{
+    return {rotateY({1.0, 0.0, 0.0}, rotation_y_rad),
+            {0.0, 1.0, 0.0},
+            rotateY({0.0, 0.0, 1.0}, rotation_y_rad)};
+}
+
 glm::dvec3 bottomCenter(const BoundingBox& box)
 {
     return {0.5 * (box.min.x + box.max.x), box.min.y, 0.5 * (box.min.z + box.max.z)};
@@ -61,6 +76,19 @@ TriangleMesh placed(const TriangleMesh& mesh, const Placement& placement)
     for (glm::vec3& normal : result.normals)
         normal = glm::vec3(rotateY(normal, placement.rotation_y_rad));
     return result;
+}
+
+Placement relativeTo(const Placement& base, const Placement& placement)
+{
+    const auto rounded = [](double value, double step) { return std::round(value / step) * step; };
+    Placement relative = placement;
+    glm::dvec3 way = rotateY(placement.position_m - base.position_m, -base.rotation_y_rad);
+    for (int axis = 0; axis < 3; ++axis)
+        way[axis] = rounded(way[axis], 1e-6);
+    relative.position_m = base.pivot_in_model + way / base.scale;
+    relative.scale = placement.scale / base.scale;
+    relative.rotation_y_rad = rounded(placement.rotation_y_rad - base.rotation_y_rad, 1e-9);
+    return relative;
 }
 
 }  // namespace insitu

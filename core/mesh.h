@@ -55,6 +55,12 @@ struct TriangleMesh {
     std::vector<std::uint32_t> material_of;
 };
 
+/// Interpolated texture coordinate, (0, 0) for a mesh without. `barycentric`: weights of the second
+/// and third corner.
+[[nodiscard]] glm::vec2 texcoordAt(const TriangleMesh& mesh,
+                                   std::uint32_t triangle,
+                                   glm::vec2 barycentric);
+
 /// A piece of furniture as loaded: one mesh (node transforms applied), its materials, textures.
 struct Model {
     TriangleMesh mesh;
@@ -88,11 +94,22 @@ struct Placement {
     glm::dvec3 position_m{0.0};
 
     [[nodiscard]] glm::dvec3 apply(glm::dvec3 x_in_model) const;
+    [[nodiscard]] glm::dmat3 worldFromModelRotation() const;
 };
 /// Bottom centre of the bounding box: centre in x and z, lowest point in y.
 [[nodiscard]] glm::dvec3 bottomCenter(const BoundingBox& box);
 /// Mesh with every vertex and normal brought into the world.
 [[nodiscard]] TriangleMesh placed(const TriangleMesh& mesh, const Placement& placement);
+/// `placement` seen from `base`: brings the model to where base.apply() brings it to its place.
+/// Lengths are rounded to a micrometre and angles to a nanoradian, so that the same arrangement
+/// elsewhere has the same numbers.
+[[nodiscard]] Placement relativeTo(const Placement& base, const Placement& placement);
+
+/// A model in its own coordinates, and where it stands.
+struct PlacedModel {
+    Model model;
+    Placement placement{};
+};
 
 /// Finds what would hurt a renderer: non-finite vertices, indices out of range, arrays of unequal
 /// length, no triangles (InputError naming `path`); drops degenerate triangles and repairs non-unit

@@ -40,7 +40,7 @@ glm::dvec3 DirectionCells::directionIn(std::size_t cell, glm::dvec2 inside) cons
     d[texel.axis] = side;
     d[(texel.axis + 1) % 3] = side * (2.0 * (texel.column + inside.x) / face_size - 1.0);
     d[(texel.axis + 2) % 3] = side * (2.0 * (texel.row + inside.y) / face_size - 1.0);
-    return glm::normalize(d);
+    return axes * glm::normalize(d);
 }
 
 double DirectionCells::solidAngle(std::size_t pair) const
@@ -55,8 +55,9 @@ double DirectionCells::solidAngle(std::size_t pair) const
            cornerSolidAngle(x0, y0);
 }
 
-DirectedPair DirectionCells::cellAt(glm::dvec3 d) const
+DirectedPair DirectionCells::cellAt(glm::dvec3 direction) const
 {
+    const glm::dvec3 d = direction * axes;
     const glm::dvec3 size = glm::abs(d);
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
     const auto index = [&](int other) {

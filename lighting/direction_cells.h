@@ -20,6 +20,7 @@ struct DirectedPair {
 /// runs along the next axis (x → y → z → x), row along the one after.
 struct DirectionCells {
     int face_size = 32;
+    glm::dmat3 axes{1.0};  ///< of the cube, as columns; a rotation
 
     [[nodiscard]] std::size_t pairCount() const
     {

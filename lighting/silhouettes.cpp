@@ -13,7 +13,7 @@ namespace insitu {
 
 namespace {
 
-/// Directions that share one set of buffers.
+/// Most directions that share one set of buffers.
 constexpr std::size_t kDirectionsAtATime = 24;
 
 bool isFinite(glm::vec3 v)
@@ -114,7 +114,10 @@ SilhouetteSet drawSilhouettes(const TriangleMesh& mesh,
     const RasterMesh raster_mesh = rasterMesh(mesh, set.local);
     INSITU_CHECK(!raster_mesh.triangles.empty(), "a mesh without triangles");
 
-    const std::size_t chunks = (directions.size() + kDirectionsAtATime - 1) / kDirectionsAtATime;
+    // Few directions, of concentrated light, keep all threads busy too.
+    const std::size_t at_a_time =
+        std::clamp<std::size_t>(directions.size() / 16, 1, kDirectionsAtATime);
+    const std::size_t chunks = (directions.size() + at_a_time - 1) / at_a_time;
     std::atomic<std::size_t> done{0};
     std::mutex reporting;
     parallelFor(0, static_cast<std::int64_t>(chunks), [&](std::int64_t chunk) {
@@ -123,8 +126,8 @@ SilhouetteSet drawSilhouettes(const TriangleMesh& mesh,
             progress.checkpoint();
         }
         SilhouetteRaster raster(raster_mesh, resolution, samples);
-        const std::size_t begin = static_cast<std::size_t>(chunk) * kDirectionsAtATime;
-        const std::size_t end = std::min(begin + kDirectionsAtATime, directions.size());
+        const std::size_t begin = static_cast<std::size_t>(chunk) * at_a_time;
+        const std::size_t end = std::min(begin + at_a_time, directions.size());
         for (std::size_t i = begin; i < end; ++i)
             set.frames[i] = raster.draw(directions[i],
                                         set.coverage.data() + i * set.texels(),

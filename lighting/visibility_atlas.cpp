@@ -184,6 +184,29 @@ VisibilityAtlas buildVisibilityAtlas(const TriangleMesh& mesh,
     return atlas;
 }
 
+VisibilityAtlas placedAtlas(VisibilityAtlas atlas,
+                            const Placement& placement,
+                            const TriangleMesh& placed_mesh)
+{
+    const glm::dmat3 turn = placement.worldFromModelRotation();
+    SilhouetteSet& set = atlas.silhouettes;
+    atlas.axes = turn * atlas.axes;
+    for (glm::dvec3& direction : set.directions)
+        direction = turn * direction;
+    for (SilhouetteFrame& frame : set.frames)
+        for (glm::vec3* axis : {&frame.column_axis, &frame.row_axis, &frame.depth_axis})
+            *axis = glm::vec3(turn * glm::dvec3(*axis));
+    LocalFrame& local = set.local;
+    local.center = placement.apply(local.center);
+    local.radius *= placement.scale;
+    glm::vec3 reach(0.0f);
+    for (const glm::uvec3& t : placed_mesh.triangles)
+        for (int corner = 0; corner < 3; ++corner)
+            reach = glm::max(reach, glm::abs(local.localFrom(placed_mesh.positions[t[corner]])));
+    local.half_extent = reach;
+    return atlas;
+}
+
 fs::path atlasFile(const TriangleMesh& mesh, const AtlasOptions& options, const fs::path& folder)
 {
     const auto content = contentHash(mesh, options);

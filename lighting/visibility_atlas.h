@@ -24,13 +24,15 @@ struct AtlasOptions {
 
 /// Which directions an object hides from a place, independent of any light: one silhouette for each
 /// pair of opposite cells of the sphere of directions. It answers for every place, outside and
-/// inside the bounding sphere, without sampling positions. Directions are in the object's own axes:
-/// a turned object keeps its atlas, the light is turned instead.
+/// inside the bounding sphere, without sampling positions. Directions are in the axes of the mesh
+/// that it was made from: a turned object keeps its atlas. Either the light is turned instead, or
+/// the atlas is placed (placedAtlas).
 struct VisibilityAtlas {
     AtlasOptions options;
+    glm::dmat3 axes{1.0};       ///< the object's, as columns; a rotation
     SilhouetteSet silhouettes;  ///< one a pair of `cells()`, in its order
 
-    [[nodiscard]] DirectionCells cells() const { return {options.face_size}; }
+    [[nodiscard]] DirectionCells cells() const { return {options.face_size, axes}; }
 };
 
 /// InputError for bad options or more memory than 4 GiB; CancelledError when `progress` says so.
@@ -52,6 +54,13 @@ struct CachedAtlas {
                                                 const AtlasOptions& options,
                                                 const std::filesystem::path& folder,
                                                 Progress& progress);
+/// The atlas of an object where it stands: its directions, places and normals are the world's from
+/// here on. Exact, and no silhouette is drawn: `placement` turns the atlas of the mesh as loaded.
+/// `placed_mesh` is that mesh in the world.
+[[nodiscard]] VisibilityAtlas placedAtlas(VisibilityAtlas atlas,
+                                          const Placement& placement,
+                                          const TriangleMesh& placed_mesh);
+
 /// The file that an atlas is kept in.
 [[nodiscard]] std::filesystem::path atlasFile(const TriangleMesh& mesh,
                                               const AtlasOptions& options,

@@ -48,14 +48,14 @@ std::vector<ObjectScene::Object> placeObjects(const Project& project, InsertResu
 {
     std::vector<ObjectScene::Object> objects;
     for (const ProjectObject& wanted : project.objects) {
-        ObjectScene::Object object{loadPlaced(wanted)};
+        ObjectScene::Object object = loadObject(wanted);
         append(result.findings, object.model.findings);
-        const BoundingBox box = boundingBox(object.model.mesh);
+        const TriangleMesh mesh = placed(object.model.mesh, object.placement);
+        const BoundingBox box = boundingBox(mesh);
         if (const auto finding = extentFinding(box, wanted.model.string()))
             result.findings.push_back(*finding);
         const double slack = 0.005;
-        const auto& positions = object.model.mesh.positions;
-        const std::vector<glm::dvec3> points(positions.begin(), positions.end());
+        const std::vector<glm::dvec3> points(mesh.positions.begin(), mesh.positions.end());
         if (const auto out = reachOutside(project.room, points); out && *out > slack)
             result.findings.push_back(
                 {Severity::Warning,
@@ -153,7 +153,7 @@ struct RenderStage {
         key.add(options.light, options.render);
         if (photographed) key.add(photographed->camera, photographed->radiance);
         for (const ObjectScene::Object& object : objects)
-            key.add(object.model);
+            key.add(object.model, object.placement);
         if (auto kept = cache.find<RenderedStage>(key)) {
             watch.lap("render", /*from_cache=*/true);
             return *std::move(kept);

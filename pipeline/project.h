@@ -135,8 +135,8 @@ struct Project {
 
 /// Where the object stands, given its model's mesh as loaded (the pivot needs its bounds).
 [[nodiscard]] Placement placementOf(const ProjectObject& object, const TriangleMesh& mesh);
-/// The object's model, loaded, brought into the world, with its material replaced when the project
-/// says so. InputError as readModel.
-[[nodiscard]] Model loadPlaced(const ProjectObject& object);
+/// The object's model, loaded, with its material replaced when the project says so, and where it
+/// stands. InputError as readModel.
+[[nodiscard]] PlacedModel loadObject(const ProjectObject& object);
 
 }  // namespace insitu

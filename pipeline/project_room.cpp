@@ -225,16 +225,16 @@ Placement placementOf(const ProjectObject& object, const TriangleMesh& mesh)
     return placement;
 }
 
-Model loadPlaced(const ProjectObject& object)
+PlacedModel loadObject(const ProjectObject& object)
 {
     Model model = readModel(object.model);
-    model.mesh = placed(model.mesh, placementOf(object, model.mesh));
     if (object.material) {
         model.materials = {*object.material};
         model.textures.clear();
         std::fill(model.mesh.material_of.begin(), model.mesh.material_of.end(), 0u);
     }
-    return model;
+    const Placement placement = placementOf(object, model.mesh);
+    return {std::move(model), placement};
 }
 
 }  // namespace insitu

@@ -124,9 +124,10 @@ Model buildShell(const SimulatedRoom& room)
     return builder.take();
 }
 
-Model loadFurniture(const SimulatedFurniture& furniture)
+PlacedModel loadFurniture(const SimulatedFurniture& furniture)
 {
-    Model model = loadPlaced(furniture.object);
+    PlacedModel loaded = loadObject(furniture.object);
+    Model& model = loaded.model;
     for (Material& material : model.materials) {
         const auto found = furniture.materials.find(material.name);
         if (found == furniture.materials.end()) continue;
@@ -139,7 +140,7 @@ Model loadFurniture(const SimulatedFurniture& furniture)
             material.metallic = material.specular = 0.0f;
             material.metallic_roughness_texture = kNoTexture;
         }
-    return model;
+    return loaded;
 }
 
 /// The environment turned about +Y, multiplied by the gain.
@@ -196,19 +197,20 @@ SimulatedScene buildScene(const SimulatedRoom& room)
         solids.push_back({box.box.name, {box.box.min_m, box.box.max_m}, true, box.in_project});
 
     std::vector<ObjectScene::Object> objects;
-    objects.push_back({buildShell(room)});
+    objects.push_back({buildShell(room), {}});
     for (const SimulatedFurniture& furniture : room.furniture) {
-        objects.push_back({loadFurniture(furniture)});
-        solids.push_back(
-            {furniture.name, boundingBox(objects.back().model.mesh), false, furniture.in_project});
+        objects.push_back(loadFurniture(furniture));
+        const auto& [model, placement] = objects.back();
+        solids.push_back({furniture.name,
+                          boundingBox(placed(model.mesh, placement)),
+                          false,
+                          furniture.in_project});
     }
-    Model object = loadPlaced(room.object);
     std::vector<ObjectScene::Object> with = objects;
-    with.push_back({object});
+    with.push_back(loadObject(room.object));
     return {ObjectScene(std::move(objects)),
             ObjectScene(std::move(with)),
             buildLight(room),
-            std::move(object),
             std::move(solids)};
 }
 

@@ -23,7 +23,6 @@ struct SimulatedScene {
     ObjectScene without;  ///< the empty place
     ObjectScene with;     ///< with the object really in it
     EnvironmentLight light;
-    Model object;  ///< placed
     std::vector<SolidBounds> solids;
 };
 

@@ -119,6 +119,11 @@ void parts(auto& archive, PartsOf<Model> auto& v)
     archive(v.mesh, v.materials, v.textures, v.findings);
 }
 
+void parts(auto& archive, PartsOf<Placement> auto& v)
+{
+    archive(v.pivot_in_model, v.scale, v.rotation_y_rad, v.position_m);
+}
+
 void parts(auto& archive, PartsOf<ResponseOptions> auto& v)
 {
     archive(v.method, v.samples, v.smoothness, v.refine_exposures);

@@ -1,6 +1,7 @@
 #include "render/object_scene.h"
 
 #include "core/check.h"
+#include "render/cut_outs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -75,31 +76,14 @@ SurfaceMaterial materialAt(const Model& model, const Material& material, glm::ve
     return at;
 }
 
-bool hasCutOuts(const Model& model)
-{
-    return std::any_of(model.materials.begin(), model.materials.end(), [](const Material& m) {
-        return m.alpha_mask;
-    });
-}
-
 }  // namespace
 
 struct ObjectScene::Impl {
     std::vector<Object> objects;
+    std::vector<TriangleMesh> meshes;  ///< in the world
     std::vector<BoundingBox> bounds;
     std::unique_ptr<RayScene> rays;
 
-    [[nodiscard]] glm::vec2 texcoord(const TriangleMesh& mesh,
-                                     std::uint32_t triangle,
-                                     glm::vec2 barycentric) const
-    {
-        if (mesh.texcoords.empty()) return glm::vec2(0.0f);
-        return interpolate(mesh.texcoords, mesh.triangles[triangle], barycentric);
-    }
-    /// False where the surface is cut out.
-    [[nodiscard]] bool isThere(std::uint32_t object,
-                               std::uint32_t triangle,
-                               glm::vec2 barycentric) const;
     /// The interpolated normal, or the geometric one of a flat or broken mesh.
     [[nodiscard]] glm::dvec3 shadingNormal(const RayHit& hit,
                                            glm::dvec3 geometric,
@@ -107,28 +91,12 @@ struct ObjectScene::Impl {
                                            bool glossy) const;
 };
 
-bool ObjectScene::Impl::isThere(std::uint32_t object,
-                                std::uint32_t triangle,
-                                glm::vec2 barycentric) const
-{
-    const Model& model = objects[object].model;
-    const Material& material = model.materials[model.mesh.material_of[triangle]];
-    if (!material.alpha_mask) return true;
-    float alpha = material.alpha;
-    if (material.base_color_texture != kNoTexture)
-        alpha *=
-            lookUpTexture(
-                model, material.base_color_texture, texcoord(model.mesh, triangle, barycentric))
-                .a;
-    return alpha >= material.alpha_cutoff;
-}
-
 glm::dvec3 ObjectScene::Impl::shadingNormal(const RayHit& hit,
                                             glm::dvec3 geometric,
                                             glm::dvec3 wo,
                                             bool glossy) const
 {
-    const TriangleMesh& mesh = objects[hit.mesh].model.mesh;
+    const TriangleMesh& mesh = meshes[hit.mesh];
     if (mesh.normals.empty()) return geometric;
     glm::dvec3 normal(interpolate(mesh.normals, mesh.triangles[hit.triangle], hit.barycentric));
     const double length = glm::length(normal);
@@ -145,20 +113,22 @@ ObjectScene::ObjectScene(std::vector<Object> objects) : impl_(std::make_unique<I
 {
     impl_->objects = std::move(objects);
     const std::size_t count = impl_->objects.size();
+    for (const Object& object : impl_->objects) {
+        checkModel(object.model);
+        impl_->meshes.push_back(placed(object.model.mesh, object.placement));
+    }
     std::vector<const TriangleMesh*> meshes;
     const auto cut_out = std::make_unique<bool[]>(count);
     for (std::size_t i = 0; i < count; ++i) {
-        const Model& model = impl_->objects[i].model;
-        checkModel(model);
-        meshes.push_back(&model.mesh);
-        impl_->bounds.push_back(boundingBox(model.mesh));
-        cut_out[i] = hasCutOuts(model);
+        meshes.push_back(&impl_->meshes[i]);
+        impl_->bounds.push_back(boundingBox(impl_->meshes[i]));
+        cut_out[i] = hasCutOuts(impl_->objects[i].model);
     }
     impl_->rays = std::make_unique<RayScene>(
         meshes,
         std::span<const bool>(cut_out.get(), count),
         [scene = impl_.get()](std::uint32_t object, std::uint32_t triangle, glm::vec2 barycentric) {
-            return scene->isThere(object, triangle, barycentric);
+            return isThere(scene->objects[object].model, triangle, barycentric);
         });
 }
 
@@ -173,6 +143,11 @@ bool ObjectScene::empty() const
 const std::vector<ObjectScene::Object>& ObjectScene::objects() const
 {
     return impl_->objects;
+}
+
+const std::vector<TriangleMesh>& ObjectScene::meshes() const
+{
+    return impl_->meshes;
 }
 
 const std::vector<BoundingBox>& ObjectScene::bounds() const
@@ -193,7 +168,7 @@ std::optional<SurfacePoint> ObjectScene::intersect(glm::dvec3 origin,
     point.position = origin + hit->distance_m * direction;
     point.geometric_normal = glm::dot(hit->normal, direction) > 0.0 ? -hit->normal : hit->normal;
     point.material =
-        materialAt(model, material, impl_->texcoord(model.mesh, hit->triangle, hit->barycentric));
+        materialAt(model, material, texcoordAt(model.mesh, hit->triangle, hit->barycentric));
     point.shading_normal =
         impl_->shadingNormal(*hit, point.geometric_normal, -direction, isGlossy(point.material));
     point.object = hit->mesh;

@@ -24,9 +24,7 @@ struct SurfacePoint {
 /// The placed objects: what scatters light. Holds triangles in world space and their textures.
 class ObjectScene {
 public:
-    struct Object {
-        Model model;  ///< mesh already placed in the world
-    };
+    using Object = PlacedModel;
     /// Models are valid as core/mesh.h says (LogicError otherwise); one without triangles is
     /// allowed.
     explicit ObjectScene(std::vector<Object> objects);
@@ -35,6 +33,8 @@ public:
 
     [[nodiscard]] bool empty() const;
     [[nodiscard]] const std::vector<Object>& objects() const;
+    /// The mesh of each object, in the world.
+    [[nodiscard]] const std::vector<TriangleMesh>& meshes() const;
     /// Axis-aligned bounds of one object, for bounding cones.
     [[nodiscard]] const std::vector<BoundingBox>& bounds() const;
     /// Alpha-masked texels let rays pass; a single-sided back face is shaded like a front face.

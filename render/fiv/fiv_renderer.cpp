@@ -1,5 +1,6 @@
 #include "render/fiv/fiv_renderer.h"
 
+#include "render/cut_outs.h"
 #include "render/fiv/object_light.h"
 #include "render/fiv/object_pixels.h"
 #include "render/fiv/object_samples.h"
@@ -18,35 +19,51 @@ double secondsSince(std::chrono::steady_clock::time_point start)
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// All objects as one mesh, for the atlas.
-TriangleMesh merged(const ObjectScene& objects)
+/// Parts of cut-out triangles along the longest side of their model: an atlas's samples.
+constexpr double kPartsAlong = 128.0;
+
+/// All objects as one mesh, for the atlas: in the coordinates of the first, so that objects that
+/// are moved, turned or scaled together keep their atlas.
+struct MergedObjects {
+    TriangleMesh mesh;
+    double largest = 0.0;  ///< diagonal of one object's box
+    Placement placement;
+    TriangleMesh in_world;
+};
+
+MergedObjects merged(const ObjectScene& objects)
 {
-    TriangleMesh all;
+    MergedObjects all;
+    if (objects.objects().empty()) return all;
+    all.placement = objects.objects().front().placement;
     for (const ObjectScene::Object& object : objects.objects()) {
-        const TriangleMesh& mesh = object.model.mesh;
-        const auto base = static_cast<std::uint32_t>(all.positions.size());
-        all.positions.insert(all.positions.end(), mesh.positions.begin(), mesh.positions.end());
+        const BoundingBox box = boundingBox(object.model.mesh);
+        const glm::dvec3 size = box.max - box.min;
+        const double longest = std::max({size.x, size.y, size.z, 1e-12});
+        const TriangleMesh own = withoutCutOuts(object.model, longest / kPartsAlong);
+        const TriangleMesh mesh = placed(own, relativeTo(all.placement, object.placement));
+        const BoundingBox placed_box = boundingBox(mesh);
+        all.largest = std::max(all.largest, glm::length(placed_box.max - placed_box.min));
+        const auto base = static_cast<std::uint32_t>(all.mesh.positions.size());
+        all.mesh.positions.insert(
+            all.mesh.positions.end(), mesh.positions.begin(), mesh.positions.end());
         for (const glm::uvec3& triangle : mesh.triangles)
-            all.triangles.push_back(triangle + base);
+            all.mesh.triangles.push_back(triangle + base);
     }
+    all.in_world = placed(all.mesh, all.placement);
     return all;
 }
 
 /// Several objects share an atlas that spans them all: as fine for each as for one, within bounds.
-int sharedResolution(const ObjectScene& objects, int resolution)
+int sharedResolution(const MergedObjects& all, int resolution)
 {
-    double largest = 0.0;
-    BoundingBox all = objects.bounds().front();
-    for (const BoundingBox& b : objects.bounds()) {
-        largest = std::max(largest, glm::length(b.max - b.min));
-        all = {glm::min(all.min, b.min), glm::max(all.max, b.max)};
-    }
-    if (!(largest > 0.0)) return resolution;
-    const double growth = std::min(glm::length(all.max - all.min) / largest, 2.0);
+    if (!(all.largest > 0.0)) return resolution;
+    const BoundingBox box = boundingBox(all.mesh);
+    const double growth = std::min(glm::length(box.max - box.min) / all.largest, 2.0);
     return std::min(static_cast<int>(resolution * growth), 512);
 }
 
-VisibilityAtlas atlasOf(const TriangleMesh& mesh,
+VisibilityAtlas atlasOf(const MergedObjects& merged,
                         const AtlasOptions& options,
                         const FivOptions& fiv,
                         InsertionResult& result,
@@ -54,31 +71,31 @@ VisibilityAtlas atlasOf(const TriangleMesh& mesh,
 {
     CachedAtlas cached;
     if (fiv.atlas_folder.empty())
-        cached.atlas = buildVisibilityAtlas(mesh, options, progress);
+        cached.atlas = buildVisibilityAtlas(merged.mesh, options, progress);
     else
-        cached = cachedVisibilityAtlas(mesh, options, fiv.atlas_folder, progress);
+        cached = cachedVisibilityAtlas(merged.mesh, options, fiv.atlas_folder, progress);
     append(result.findings, cached.findings);
     result.table_bytes += cached.atlas.silhouettes.memoryBytes();
-    return std::move(cached.atlas);
+    return placedAtlas(std::move(cached.atlas), merged.placement, merged.in_world);
 }
 
 FivScene makeScene(const RoomLight& room,
                    const ObjectScene& objects,
+                   const MergedObjects& all,
                    const FivOptions& fiv,
                    InsertionResult& result,
                    Progress& progress)
 {
     const auto start = std::chrono::steady_clock::now();
     const std::clock_t worked = std::clock();
-    const TriangleMesh mesh = merged(objects);
     AtlasOptions fine = fiv.atlas;
-    fine.resolution = sharedResolution(objects, fine.resolution);
+    fine.resolution = sharedResolution(all, fine.resolution);
     AtlasOptions coarse = fine;
     coarse.face_size = fiv.object_face_size;
     FivScene scene{room,
                    objects,
-                   atlasOf(mesh, fine, fiv, result, progress),
-                   atlasOf(mesh, coarse, fiv, result, progress),
+                   atlasOf(all, fine, fiv, result, progress),
+                   atlasOf(all, coarse, fiv, result, progress),
                    {},
                    {},
                    {},
@@ -112,7 +129,7 @@ void lightEachOther(FivScene& scene,
         places.push_back(ObjectShading::placeOf(sample.point));
         places.back().normal = sample.point.geometric_normal;
     }
-    scene.bounce = ObjectBounce(scene.objects, samples);
+    scene.sent = SentLight(scene.objects, samples);
     for (int round = 0; round < 3; ++round) {
         if (round == 2) scene.room_change = roomChange(scene, receivers);
         if (round > 0) shading.update(/*room_too=*/round == 2);
@@ -149,21 +166,13 @@ InsertionResult renderFiv(const Camera& camera,
     InsertionResult result;
     result.technique = Technique::Fiv;
     result.layers = emptyLayers(camera.width, camera.height);
-    if (objects.empty()) {
+    const MergedObjects all = merged(objects);
+    if (all.mesh.triangles.empty()) {
         emptyRoom(camera, room, result.layers);
         return result;
     }
-    for (const ObjectScene::Object& object : objects.objects())
-        for (const Material& material : object.model.materials)
-            if (material.alpha_mask && !hasFinding(result.findings, "fiv-cut-outs-are-solid"))
-                result.findings.push_back(
-                    {Severity::Warning,
-                     "fiv-cut-outs-are-solid",
-                     "technique fiv sees cut-out materials as solid when it computes shadows: they "
-                     "are too dark; technique reference sees the holes"});
-
     const FivOptions& fiv = options.fiv;
-    FivScene scene = makeScene(room, objects, fiv, result, progress);
+    FivScene scene = makeScene(room, objects, all, fiv, result, progress);
     ObjectShading shading(scene, {fiv.object_node_spacing_m, fiv.bias_texels});
     ReceiverLight light(scene, fiv.receiver_node_spacing_m);
     if (fiv.interreflection) lightEachOther(scene, shading, light, fiv, progress);

@@ -4,8 +4,8 @@
 #include "lighting/light_spots.h"
 #include "lighting/place_light.h"
 #include "lighting/visibility_atlas.h"
-#include "render/fiv/object_bounce.h"
 #include "render/fiv/object_glow.h"
+#include "render/fiv/sent_light.h"
 #include "render/object_scene.h"
 #include "render/renderer.h"
 
@@ -29,8 +29,8 @@ struct FivScene {
     /// cell of `coarse`, number 2·pair + side as in PlaceLight. What hides light sends this
     /// instead.
     std::vector<Rgb> glow;
-    ObjectGlow near;      ///< what of that is different close to the objects
-    ObjectBounce bounce;  ///< and what they show themselves and each other
+    ObjectGlow near;  ///< what of that is different close to the objects
+    SentLight sent;   ///< and what they show themselves and each other
 
     [[nodiscard]] const LocalFrame& frame() const { return coarse.silhouettes.local; }
     [[nodiscard]] Rgb glowAlong(glm::dvec3 direction) const

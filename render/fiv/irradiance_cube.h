@@ -6,7 +6,8 @@
 
 namespace insitu {
 
-/// A quantity for all directions, on the cells of a cube, bilinear on each face.
+/// A quantity >= 0 for all directions, on the cells of a cube, bilinear on each face. At least 2x2
+/// cells a face.
 class DirectionTable {
 public:
     DirectionTable() = default;
@@ -19,15 +20,11 @@ public:
     [[nodiscard]] Rgb lookUp(glm::dvec3 direction) const;
 
 private:
-    DirectionCells cells_{1};
+    DirectionCells cells_{2};
     std::vector<Rgb> values_;  ///< number 2·pair + side
 };
 
 /// Irradiance of surfaces of any normal in a light, changes of the room included [Michael10, 3.1].
 [[nodiscard]] DirectionTable irradianceCube(const PlaceLight& light, int face_size);
-
-/// The same light seen by a glossy surface that mirrors a direction: the mean radiance, weighted by
-/// the GGX lobe of that roughness as it is for a viewer along the normal.
-[[nodiscard]] DirectionTable glossyCube(const PlaceLight& light, double roughness, int face_size);
 
 }  // namespace insitu

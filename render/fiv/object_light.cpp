@@ -7,6 +7,7 @@
 #include "render/bsdf/ggx_albedo.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -16,35 +17,10 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaxNodesAlong = 6;
-constexpr int kIrradianceCube = 8;
-constexpr int kGlossyCube = 16;
-/// Roughnesses of the tables of glossy light, 0 to 1.
-constexpr int kGlossyLevels = 5;
-/// Surfaces smoother than this are mirrors whose reflected ray is followed.
-constexpr float kSmooth = 0.25f;
-/// Share of hidden light beyond which the open light is not known from the mean.
-constexpr float kMostGain = 4.0f;
-/// Short rays of a place: the first few, and all where one of these meets something.
-constexpr int kFirstRays = 8;
+constexpr int kIrradianceCube = 16;
+/// Rays of a place: the first few, and all where one of these meets something near.
+constexpr int kFirstRays = 16;
 constexpr int kNearRays = 32;
-
-/// Metal of this base colour, times `scale`, has the same glossy lobe.
-struct GlossyLobe {
-    SurfaceMaterial metal;
-    float scale = 0.0f;
-};
-GlossyLobe glossyLobe(const SurfaceMaterial& m)
-{
-    const float f90 = glm::mix(m.specular, 1.0f, m.metallic);
-    GlossyLobe lobe;
-    lobe.scale = f90;
-    lobe.metal = m;
-    lobe.metal.metallic = 1.0f;
-    if (f90 > 0.0f)
-        lobe.metal.base_color =
-            glm::mix(glm::vec3(0.04f * m.specular), m.base_color, m.metallic) / f90;
-    return lobe;
-}
 
 /// What of diffuse light the base reflects: a coat lets less through at grazing views.
 Rgb diffuseReflectance(const SurfaceMaterial& m, double cosine)
@@ -72,18 +48,12 @@ Rgb evenReflectance(const SurfaceMaterial& m)
 
 ObjectShading::Place ObjectShading::placeOf(const SurfacePoint& point)
 {
-    return {point.position,
-            point.shading_normal,
-            point.geometric_normal,
-            evenReflectance(point.material)};
+    return {point.position, point.shading_normal, point.geometric_normal};
 }
 
 ObjectShading::ObjectShading(const FivScene& scene, const ObjectLightOptions& options)
     : scene_(scene), options_(options)
 {
-    for (const ObjectScene::Object& object : scene.objects.objects())
-        for (const Material& m : object.model.materials)
-            any_glossy_ = any_glossy_ || m.specular > 0.0f || m.metallic > 0.0f;
     const SilhouetteSet& set = scene.coarse.silhouettes;
     double texels_m = 0.0;
     for (const SilhouetteFrame& frame : set.frames)
@@ -113,13 +83,6 @@ void ObjectShading::update(bool room_too)
             mean_.change[cell] /= static_cast<float>(lights_.size());
         }
         mean_irradiance_ = irradianceCube(mean_, kIrradianceCube);
-        if (any_glossy_) {
-            glossy_.resize(kGlossyLevels);
-            parallelFor(0, kGlossyLevels, [&](std::int64_t level) {
-                glossy_[static_cast<std::size_t>(level)] = glossyCube(
-                    mean_, static_cast<double>(level) / (kGlossyLevels - 1), kGlossyCube);
-            });
-        }
     }
     hideable_ = lightOfCells(scene_, mean_, /*less_glow=*/false);
 }
@@ -208,7 +171,7 @@ Rgb ObjectShading::spotIrradiance(const Place& place) const
     return Rgb(sum);
 }
 
-float ObjectShading::hiddenNearby(const Place& place) const
+ObjectShading::Around ObjectShading::lookAtObjects(const Place& place) const
 {
     SurfacePoint point;
     point.position = place.position;
@@ -218,7 +181,12 @@ float ObjectShading::hiddenNearby(const Place& place) const
     const auto fraction = [](double value) {
         return static_cast<float>(value - std::floor(value));
     };
-    int met = 0;
+    std::array<glm::dvec3, kNearRays> near;
+    std::array<glm::dvec3, kNearRays> passed;
+    std::size_t near_count = 0;
+    std::size_t passed_count = 0;
+    Around around;
+    int met_count = 0;
     int rays = kFirstRays;
     for (int i = 0; i < rays; ++i) {
         // Additive recurrence with the plastic number: every beginning of it is even.
@@ -226,12 +194,38 @@ float ObjectShading::hiddenNearby(const Place& place) const
             to_world * cosineHemisphere({fraction(0.5 + 0.7548776662466927 * i),
                                          fraction(0.5 + 0.5698402909980532 * i)});
         // Below the surface by its own curvature, not by what lies near.
-        if (glm::dot(direction, place.geometric_normal) > 0.0 &&
-            scene_.objects.occluded(start, direction, near_m_))
-            ++met;
-        if (i + 1 == kFirstRays && met > 0) rays = kNearRays;
+        const auto met = glm::dot(direction, place.geometric_normal) > 0.0
+                             ? scene_.objects.intersect(start, direction)
+                             : std::nullopt;
+        if (met && met->distance_m < near_m_) {
+            near[near_count++] = direction;
+            around.sent_nearby += scene_.sent.at(met->position, met->geometric_normal);
+        } else {
+            passed[passed_count++] = direction;
+            if (met) {
+                around.sent += scene_.sent.at(met->position, met->geometric_normal);
+                ++met_count;
+            }
+        }
+        if (i + 1 == kFirstRays && near_count > 0) rays = kNearRays;
     }
-    return static_cast<float>(met) / static_cast<float>(rays);
+    // Where rays meet nothing, what the atlas takes for hidden is the surface's own beginning.
+    around.sent = met_count > 0 ? around.sent / static_cast<float>(met_count)
+                                : scene_.sent.at(place.position, place.normal);
+    if (near_count == 0) return around;
+    around.sent_nearby /= static_cast<float>(near_count);
+    // What is thick hides in the atlas too: it counts once.
+    const glm::vec3 local = scene_.frame().localFrom(place.position);
+    const auto open = [&](std::span<const glm::dvec3> directions) {
+        float sum = 0.0f;
+        for (const glm::dvec3& direction : directions)
+            sum += 1.0f - hiddenShare(scene_.coarse, local, direction, options_.bias_texels);
+        return sum;
+    };
+    const float lost = open({near.data(), near_count});
+    const float left = open({passed.data(), passed_count});
+    around.hidden_nearby = lost + left > 0.0f ? lost / (lost + left) : 0.0f;
+    return around;
 }
 
 std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Place> places) const
@@ -248,85 +242,32 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
     std::vector<Received> result(places.size());
     for (std::size_t i = 0; i < places.size(); ++i) {
         const Rgb all = mean_irradiance_.lookUp(places[i].normal);
-        const Rgb sent = lost[i].sky * scene_.bounce.at(places[i].position, places[i].normal);
-        const Rgb left = glm::max(all - lost[i].light + sent, Rgb(0.0f));
+        const Rgb left = glm::max(all - lost[i].light, Rgb(0.0f));
         const Rgb open = openIrradiance(places[i]);
         Received& r = result[i];
-        // Where the mean light brings nothing, what objects send is all there is.
         for (int c = 0; c < 3; ++c)
-            r.smooth[c] = all[c] > 0.0f ? open[c] * std::min(left[c] / all[c], kMostGain) : left[c];
-        const float level = luminance(all);
-        r.open = level > 0.0f ? std::clamp(luminance(left) / level, 0.0f, 1.0f) : 1.0f;
+            r.smooth[c] = all[c] > 0.0f ? open[c] * (left[c] / all[c]) : 0.0f;
         if (scene_.light != FivLight::Cube) {
-            // What hides nearby is lit as the place is, and sends its share of that back.
-            const float hidden = hiddenNearby(places[i]);
-            r.smooth *=
-                (1.0f - hidden) / (1.0f - hidden * glm::min(places[i].reflectance, Rgb(0.95f)));
-            r.open *= 1.0f - hidden;
+            const Around around = lookAtObjects(places[i]);
+            r.smooth += lost[i].sky * around.sent;
+            const float hidden = around.hidden_nearby;
+            r.smooth = r.smooth * (1.0f - hidden) +
+                       hidden * std::max(kPi - lost[i].sky, 0.0f) * around.sent_nearby;
         }
         if (!scene_.spots.spots().empty()) r.spots = spotIrradiance(places[i]);
     }
     return result;
 }
 
-Rgb ObjectShading::mirrored(const SurfacePoint& point, glm::dvec3 direction) const
-{
-    const glm::dvec3 start = scene_.objects.leave(point, direction);
-    const RoomLight::Arrival arrival = scene_.room.arrive(start, direction);
-    if (scene_.mayMeetObjects(start, direction) &&
-        scene_.objects.occluded(start, direction, arrival.light.distance_m))
-        return scene_.glowAlong(direction);
-    Rgb radiance = arrival.light.radiance;
-    if (arrival.hit && !arrival.hit->opening)
-        radiance += scene_.room_change.lookUp(arrival.hit->face, arrival.hit->uv, Rgb(0.0f));
-    return glm::max(radiance, Rgb(0.0f));
-}
-
-Rgb ObjectShading::glossy(const SurfacePoint& point, glm::dvec3 wo, const Received& received) const
-{
-    const GlossyLobe lobe = glossyLobe(point.material);
-    const glm::dvec3 normal = point.shading_normal;
-    const double cosine = std::max(glm::dot(normal, wo), 0.0);
-    const ggx::Albedo albedo = ggx::directionalAlbedo(point.material.roughness, cosine);
-    const Rgb reflected = lobe.scale * (lobe.metal.base_color * static_cast<float>(albedo.at_f0) +
-                                        static_cast<float>(albedo.at_f90));
-    const glm::dvec3 mirror = glm::reflect(-wo, normal);
-    const float roughness = std::clamp(point.material.roughness, 0.0f, 1.0f);
-    if (roughness < kSmooth) return reflected * mirrored(point, mirror);
-
-    const float level = roughness * (kGlossyLevels - 1);
-    const int below = std::min(static_cast<int>(level), kGlossyLevels - 2);
-    const Rgb smooth = glm::mix(glossy_[static_cast<std::size_t>(below)].lookUp(mirror),
-                                glossy_[static_cast<std::size_t>(below) + 1].lookUp(mirror),
-                                level - static_cast<float>(below));
-    Rgb sum = reflected * smooth * received.open;
-    if (received.spots == Rgb(0.0f)) return sum;
-    // The light of spots one by one; what of it is hidden is taken from the irradiance.
-    Rgb all(0.0f);
-    Rgb shining(0.0f);
-    for (const LightSpot& spot : scene_.spots.spots()) {
-        const auto arriving = reach(scene_.room, spot, point.position);
-        if (!arriving) continue;
-        const double c = glm::dot(arriving->direction, normal);
-        if (c <= 0.0) continue;
-        const Rgb irradiance(arriving->irradiance * c);
-        all += irradiance;
-        shining +=
-            lobe.scale * evaluateBsdf(lobe.metal, normal, wo, arriving->direction) * irradiance;
-    }
-    for (int c = 0; c < 3; ++c)
-        if (all[c] > 0.0f) sum[c] += shining[c] * std::min(1.0f, received.spots[c] / all[c]);
-    return sum;
-}
-
 Rgb ObjectShading::radiance(const SurfacePoint& point,
                             glm::dvec3 wo,
-                            const Received& received) const
+                            const Received& received,
+                            const LobeDraw& draw) const
 {
     const double cosine = std::abs(glm::dot(point.shading_normal, wo));
     Rgb sum = point.material.emissive +
               diffuseReflectance(point.material, cosine) * (received.smooth + received.spots) / kPi;
-    if (isGlossy(point.material)) sum += glossy(point, wo, received);
+    if (isGlossy(point.material)) sum += glossyRadiance(scene_, point, wo, received.spots, draw);
     return sum;
 }
 

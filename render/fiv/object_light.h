@@ -2,6 +2,7 @@
 
 #include "render/fiv/fiv_scene.h"
 #include "render/fiv/irradiance_cube.h"
+#include "render/fiv/object_gloss.h"
 
 #include <span>
 #include <vector>
@@ -19,8 +20,8 @@ struct ObjectLightOptions {
 ///
 /// Irradiance as if nothing of the objects hid anything comes from a grid of places around them;
 /// the share of it that they hide from themselves from the atlas, under the mean of that light.
-/// What hides shines with its own mean radiance (FivScene::glow). What is nearer than the atlas can
-/// tell from the surface itself (`bias_texels`: creases, seams) is met by short rays.
+/// What hides shines with what a few rays from the place meet of it. What is nearer than the atlas
+/// can tell from the surface itself (`bias_texels`: creases, seams) is hidden by the same rays.
 class ObjectShading {
 public:
     ObjectShading(const FivScene& scene, const ObjectLightOptions& options);
@@ -32,31 +33,32 @@ public:
         glm::dvec3 position{0.0};
         glm::dvec3 normal{0.0};            ///< for shading
         glm::dvec3 geometric_normal{0.0};  ///< same side
-        Rgb reflectance{0.0f};             ///< of even light, in all
     };
     [[nodiscard]] static Place placeOf(const SurfacePoint& point);
     struct Received {
-        Rgb smooth{0.0f};   ///< irradiance without that of spots
-        Rgb spots{0.0f};    ///< irradiance of spots
-        float open = 1.0f;  ///< share of the smooth light that is not hidden
+        Rgb smooth{0.0f};  ///< irradiance without that of spots
+        Rgb spots{0.0f};   ///< irradiance of spots
     };
     [[nodiscard]] std::vector<Received> receive(std::span<const Place> places) const;
 
     /// Radiance of a surface point towards `wo`.
     [[nodiscard]] Rgb radiance(const SurfacePoint& point,
                                glm::dvec3 wo,
-                               const Received& received) const;
+                               const Received& received,
+                               const LobeDraw& draw) const;
 
 private:
     void lookFromNodes(double spacing_m);
     [[nodiscard]] Rgb openIrradiance(const Place& place) const;
     [[nodiscard]] Rgb spotIrradiance(const Place& place) const;
-    /// Share of even light that surfaces nearer than the atlas tells hide.
-    [[nodiscard]] float hiddenNearby(const Place& place) const;
-    [[nodiscard]] Rgb glossy(const SurfacePoint& point,
-                             glm::dvec3 wo,
-                             const Received& received) const;
-    [[nodiscard]] Rgb mirrored(const SurfacePoint& point, glm::dvec3 direction) const;
+    /// What objects are to a place on them, by a few rays.
+    struct Around {
+        Rgb sent{0.0f};  ///< mean radiance of what hides light
+        Rgb sent_nearby{0.0f};
+        float hidden_nearby = 0.0f;  ///< share of even light that is hidden nearer than the atlas
+                                     ///< tells, of what it leaves
+    };
+    [[nodiscard]] Around lookAtObjects(const Place& place) const;
 
     const FivScene& scene_;
     ObjectLightOptions options_;
@@ -65,11 +67,9 @@ private:
     glm::ivec3 node_count_{1};
     std::vector<PlaceLight> lights_;     ///< one a node
     std::vector<DirectionTable> nodes_;  ///< their irradiance
-    bool any_glossy_ = false;
     PlaceLight mean_;
     DirectionTable mean_irradiance_;
     CellRadiance hideable_;
-    std::vector<DirectionTable> glossy_;  ///< of evenly spaced roughnesses, the last is 1
 };
 
 /// What of even light the surface reflects in all.

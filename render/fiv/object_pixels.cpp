@@ -180,8 +180,10 @@ std::vector<std::optional<ReceiverPlace>> renderObjectPixels(const Camera& camer
         for (const PixelPoints& pixel : pixels) {
             Rgb sum(0.0f);
             for (std::size_t i = 0; i < pixel.points.size(); ++i)
-                sum += shading.radiance(
-                    pixel.points[i], pixel.toward_camera[i], received[pixel.place[i]]);
+                sum += shading.radiance(pixel.points[i],
+                                        pixel.toward_camera[i],
+                                        received[pixel.place[i]],
+                                        LobeDraw::of(pixel.pixel, static_cast<int>(i)));
             layers.alpha(pixel.pixel.x, pixel.pixel.y) = pixel.alpha;
             layers.object(pixel.pixel.x, pixel.pixel.y) =
                 sum * (pixel.alpha / static_cast<float>(pixel.points.size()));

@@ -23,8 +23,8 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
     std::vector<Piece> pieces;
     std::vector<double> areas;
     double total = 0.0;
-    for (std::size_t o = 0; o < objects.objects().size(); ++o) {
-        const TriangleMesh& mesh = objects.objects()[o].model.mesh;
+    for (std::size_t o = 0; o < objects.meshes().size(); ++o) {
+        const TriangleMesh& mesh = objects.meshes()[o];
         for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
             const glm::uvec3 corner = mesh.triangles[t];
             const glm::dvec3 a(mesh.positions[corner.x]);
@@ -42,7 +42,7 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
         const auto found = std::lower_bound(areas.begin(), areas.end(), wanted);
         const Piece piece = pieces[static_cast<std::size_t>(
             std::min(found - areas.begin(), static_cast<std::ptrdiff_t>(areas.size()) - 1))];
-        const TriangleMesh& mesh = objects.objects()[piece.object].model.mesh;
+        const TriangleMesh& mesh = objects.meshes()[piece.object];
         const glm::uvec3 corner = mesh.triangles[piece.triangle];
         const glm::dvec3 a(mesh.positions[corner.x]);
         const glm::dvec3 u = glm::dvec3(mesh.positions[corner.y]) - a;
@@ -87,10 +87,10 @@ void setGlow(FivScene& scene,
     for (std::size_t i = 0; i < samples.size(); ++i)
         near.add(samples[i].point.position,
                  samples[i].point.geometric_normal,
-                 samples[i].area * static_cast<double>(scene.bounce.open(i)),
+                 samples[i].area * static_cast<double>(scene.sent.open(i)),
                  sent[i]);
     scene.near = std::move(near);
-    scene.bounce.update(sent);
+    scene.sent.update(sent);
     parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
         const std::size_t pair = static_cast<std::size_t>(number);
         glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};

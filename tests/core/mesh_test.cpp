@@ -153,6 +153,38 @@ TEST(ValidateMesh, KeepsTinyAndHugeTriangles)
     }
 }
 
+TEST(RelativeTo, LeadsToTheSamePlace)
+{
+    const Placement base{{0.1, 0.2, 0.3}, 2.0, 0.5, {10.0, 1.0, -20.0}};
+    const Placement other{{-1.0, 0.0, 0.5}, 0.001, -2.0, {11.0, 1.5, -19.0}};
+    const Placement relative = relativeTo(base, other);
+    for (const glm::dvec3 x : {glm::dvec3(0.0), glm::dvec3(120.0, -40.0, 300.0)})
+        expectNear(base.apply(relative.apply(x)), other.apply(x), 1e-6);
+    // Seen from itself it is nowhere and does nothing.
+    const glm::dvec3 x(1.0 / 3.0, -7.0, 0.1);
+    expectNear(relativeTo(base, base).apply(x), x, tolerance::kDouble);
+}
+
+TEST(RelativeTo, IsTheSameNumbersElsewhere)
+{
+    const Placement base{{0.1, 0.2, 0.3}, 1.0, 0.0, {0.0, 0.0, 0.0}};
+    const Placement other{{0.0, 0.0, 0.0}, 1.0, 0.25, {0.3, 0.0, 0.7}};
+    const Placement here = relativeTo(base, other);
+    for (const double turn : {0.1, 1.3, 2.9}) {
+        const glm::dvec3 way(7.1, 0.0, -3.3);
+        const Placement turning{glm::dvec3(0.0), 1.0, turn, way};
+        Placement moved_base = base;
+        moved_base.position_m = turning.apply(base.position_m);
+        moved_base.rotation_y_rad += turn;
+        Placement moved = other;
+        moved.position_m = turning.apply(other.position_m);
+        moved.rotation_y_rad += turn;
+        const Placement there = relativeTo(moved_base, moved);
+        EXPECT_EQ(there.position_m, here.position_m) << turn;
+        EXPECT_EQ(there.rotation_y_rad, here.rotation_y_rad) << turn;
+    }
+}
+
 TEST(ValidateMesh, RepairsNormals)
 {
     Model model = oneTriangle();

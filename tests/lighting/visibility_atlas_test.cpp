@@ -218,6 +218,34 @@ TEST(VisibilityAtlas, DoesNotDependOnScaleOrPlace)
     EXPECT_LT(difference / 255.0 / static_cast<double>(atlas.silhouettes.coverage.size()), 0.003);
 }
 
+TEST(VisibilityAtlas, IsPlacedExactly)
+{
+    const TriangleMesh mesh = shapes::chair();
+    const VisibilityAtlas atlas = buildVisibilityAtlas(mesh, {8, 64, 2}, silent);
+    const Placement placement{{0.1, 0.2, -0.3}, 2.5, 0.8, {100.0, 3.0, -50.0}};
+    const VisibilityAtlas world = placedAtlas(atlas, placement, placed(mesh, placement));
+    const glm::dmat3 turn = placement.worldFromModelRotation();
+    double hidden = 0.0;
+    for (int i = 0; i < 2000; ++i) {
+        RandomStream random(20261126, 0, static_cast<std::uint64_t>(i));
+        const glm::dvec3 x = randomDirection(random) * random.uniformDouble();
+        const glm::dvec3 d = randomDirection(random);
+        const float expected = hiddenShare(atlas, atlas.silhouettes.local.localFrom(x), d);
+        const float found =
+            hiddenShare(world, world.silhouettes.local.localFrom(placement.apply(x)), turn * d);
+        EXPECT_NEAR(found, expected, 1e-3) << "place " << i;
+        hidden += static_cast<double>(expected);
+    }
+    EXPECT_GT(hidden, 50.0);  // it was asked where it hides something
+    // The box is the one of the turned chair.
+    const LocalFrame frame = localFrame(placed(mesh, placement));
+    const glm::dvec3 reach = frame.radius * glm::dvec3(frame.half_extent);
+    const glm::dvec3 found =
+        world.silhouettes.local.radius * glm::dvec3(world.silhouettes.local.half_extent);
+    for (int axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(found[axis], reach[axis], 0.03);
+}
+
 TEST(VisibilityAtlas, SameBytesForOneThreadAndMany)
 {
     const TriangleMesh mesh = shapes::sphere({0, 0, 0}, 1.0f, 20);

@@ -211,9 +211,9 @@ TEST_F(ProjectFile, PlacedModelStandsAndHasTheProjectsMaterial)
     object["material"] =
         Json::parse(R"({"base_color_linear": [0.4, 0.3, 0.2], "roughness": 0.7, "specular": 0})");
     const Project project = read(json);
-    const Model model = loadPlaced(project.objects[0]);
+    const auto [model, placement] = loadObject(project.objects[0]);
     // 2 x 4 x 6 units, centred, scaled by 0.01, turned by 90 degrees: x and z change places.
-    const BoundingBox box = boundingBox(model.mesh);
+    const BoundingBox box = boundingBox(placed(model.mesh, placement));
     for (int axis = 0; axis < 3; ++axis) {
         EXPECT_NEAR(box.min[axis], glm::dvec3(0.5 - 0.03, 0.0, -0.01)[axis], tolerance::kFloat);
         EXPECT_NEAR(box.max[axis], glm::dvec3(0.5 + 0.03, 0.04, 0.01)[axis], tolerance::kFloat);

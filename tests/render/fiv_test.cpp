@@ -321,20 +321,6 @@ TEST(RenderFiv, ABlackEnvironmentGivesBlackLayers)
     EXPECT_EQ(layers.alpha(8, 6), 1.0f);
 }
 
-TEST(RenderFiv, SaysThatCutOutsCastWholeShadows)
-{
-    const SceneProxy proxy(floorOnly());
-    const RoomLight light = lightOf(proxy, uniform(1.0f));
-    Material leaf = shapes::lambert(glm::vec3(0.5f));
-    leaf.alpha_mask = true;
-    std::vector<ObjectScene::Object> objects;
-    objects.push_back({shapes::model(shapes::sphere({0, 0.5f, 0}, 0.3f, 8), leaf)});
-    const Camera camera = Camera::lookAt({1.2, 1.4, 1.6}, {0, 0.5, 0}, 20.0, 8, 6);
-    const InsertionResult result =
-        renderInsertion(camera, light, ObjectScene(std::move(objects)), fiv(), g_silent);
-    EXPECT_TRUE(hasFinding(result.findings, "fiv-cut-outs-are-solid"));
-}
-
 TEST(RenderFiv, ValidateNamesEveryMistake)
 {
     InsertionOptions options = fiv();
