@@ -120,8 +120,22 @@ private:
         known_[pixel] = 1;
         wanted_.push_back(pixel);
     }
+    /// Place on a Z-order curve: what is summed together should be neighbours.
+    [[nodiscard]] std::uint64_t alongCurve(std::size_t pixel) const
+    {
+        const auto width = static_cast<std::size_t>(width_);
+        const auto spread = [](std::uint64_t v) {
+            v = (v | v << 16U) & 0x0000ffff0000ffffU;
+            v = (v | v << 8U) & 0x00ff00ff00ff00ffU;
+            v = (v | v << 4U) & 0x0f0f0f0f0f0f0f0fU;
+            v = (v | v << 2U) & 0x3333333333333333U;
+            return (v | v << 1U) & 0x5555555555555555U;
+        };
+        return spread(pixel % width) | spread(pixel / width) << 1U;
+    }
     void evaluate()
     {
+        std::ranges::sort(wanted_, {}, [this](std::size_t pixel) { return alongCurve(pixel); });
         std::vector<glm::vec3> places(wanted_.size());
         std::vector<Rgb> found(wanted_.size());
         for (std::size_t k = 0; k < wanted_.size(); ++k)

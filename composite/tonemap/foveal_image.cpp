@@ -1,5 +1,6 @@
 #include "composite/tonemap/foveal_image.h"
 
+#include "core/check.h"
 #include "core/parallel.h"
 
 #include <opencv2/core.hpp>
@@ -48,22 +49,17 @@ Rgb coveredMean(const CellCover& cover, std::size_t cell, const Get& get)
     return sum / weight;
 }
 
-/// Kernel cos(angle) / angle² with its middle at (0, 0), cyclic; the place itself is left out.
-cv::Mat kernelSpectrum(const cv::Size& size)
+/// Spectrum times the kernel's, and back.
+void convolve(cv::Mat& plane, const Image<float>& spectrum, int rows)
 {
-    cv::Mat kernel(size, CV_32FC2);
-    parallelFor(0, size.height, [&](std::int64_t row) {
-        const int y = static_cast<int>(row);
-        for (int x = 0; x < size.width; ++x) {
-            const double degrees =
-                std::hypot(std::min(x, size.width - x), std::min(y, size.height - y));
-            const bool counts = degrees > 0.0 && degrees < 90.0;
-            const double weight = counts ? std::cos(degrees * kDegree) / (degrees * degrees) : 0.0;
-            kernel.at<cv::Vec2f>(y, x) = {static_cast<float>(weight), 0.0f};
-        }
-    });
-    cv::dft(kernel, kernel);
-    return kernel;
+    cv::dft(plane, plane, 0, rows);
+    for (int y = 0; y < plane.rows; ++y) {
+        cv::Vec2f* const line = plane.ptr<cv::Vec2f>(y);
+        const auto factors = spectrum.row(y);
+        for (int x = 0; x < plane.cols; ++x)
+            line[x] *= factors[static_cast<std::size_t>(x)];
+    }
+    cv::dft(plane, plane, cv::DFT_INVERSE | cv::DFT_SCALE);
 }
 
 }  // namespace
@@ -122,46 +118,66 @@ void FovealImage::add(const SceneStrip& strip)
     open_weight_ = left_weight;
 }
 
-Image<Rgb> veilingLuminance(const Image<Rgb>& foveal)
+VeilKernel::VeilKernel(int width, int height) : weights_(width, height)
 {
     // Room for the kernel's reach, so that the cyclic sum does not come around.
     const auto padded = [](int pixels) {
         return cv::getOptimalDFTSize(pixels + std::min(pixels, 90));
     };
-    const cv::Size size(padded(foveal.width()), padded(foveal.height()));
-    // Two real images in each complex one: red and green, blue and the sum of the weights. The
-    // latter in the picture's own unit, so that rounding does not carry it over.
-    double light = 0.0;
-    for (const Rgb& place : foveal.pixels())
-        light += static_cast<double>(place.r + place.g + place.b);
-    if (light == 0.0) return Image<Rgb>(foveal.width(), foveal.height(), Rgb(0.0f));
-    const auto unit = static_cast<float>(light / (3.0 * static_cast<double>(foveal.pixelCount())));
+    const cv::Size size(padded(width), padded(height));
+    // Its middle at (0, 0), cyclic; the place itself is left out.
+    cv::Mat kernel(size, CV_32FC2);
+    parallelFor(0, size.height, [&](std::int64_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < size.width; ++x) {
+            const double degrees =
+                std::hypot(std::min(x, size.width - x), std::min(y, size.height - y));
+            const bool counts = degrees > 0.0 && degrees < 90.0;
+            const double weight = counts ? std::cos(degrees * kDegree) / (degrees * degrees) : 0.0;
+            kernel.at<cv::Vec2f>(y, x) = {static_cast<float>(weight), 0.0f};
+        }
+    });
+    cv::dft(kernel, kernel);
+    spectrum_ = Image<float>(size.width, size.height);
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x)
+            spectrum_(x, y) = kernel.at<cv::Vec2f>(y, x)[0];
+
+    cv::Mat ones = cv::Mat::zeros(size, CV_32FC2);
+    ones(cv::Rect(0, 0, width, height)).setTo(cv::Scalar(1.0, 0.0));
+    convolve(ones, spectrum_, height);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            weights_(x, y) = ones.at<cv::Vec2f>(y, x)[0];
+}
+
+Image<Rgb> VeilKernel::veil(const Image<Rgb>& foveal) const
+{
+    INSITU_CHECK(isFor(foveal), "{}x{}", foveal.width(), foveal.height());
+    // Two real images in a complex one: red and green.
     std::array<cv::Mat, 2> planes;
-    const cv::Mat kernel = kernelSpectrum(size);
     parallelFor(0, 2, [&](std::int64_t pair) {
         cv::Mat& plane = planes[static_cast<std::size_t>(pair)];
-        plane = cv::Mat::zeros(size, CV_32FC2);
-        for (int y = 0; y < foveal.height(); ++y)
+        plane = cv::Mat::zeros(cv::Size(spectrum_.width(), spectrum_.height()), CV_32FC2);
+        for (int y = 0; y < foveal.height(); ++y) {
+            cv::Vec2f* const line = plane.ptr<cv::Vec2f>(y);
             for (int x = 0; x < foveal.width(); ++x) {
                 const Rgb& c = foveal(x, y);
-                plane.at<cv::Vec2f>(y, x) = pair == 0 ? cv::Vec2f(c.r, c.g) : cv::Vec2f(c.b, unit);
+                line[x] = pair == 0 ? cv::Vec2f(c.r, c.g) : cv::Vec2f(c.b, 0.0f);
             }
-        cv::dft(plane, plane);
-        cv::mulSpectrums(plane, kernel, plane, 0);
-        cv::dft(plane, plane, cv::DFT_INVERSE | cv::DFT_SCALE);
+        }
+        convolve(plane, spectrum_, foveal.height());
     });
-    Image<Rgb> veil(foveal.width(), foveal.height(), Rgb(0.0f));
+    Image<Rgb> veil(foveal.width(), foveal.height());
     for (int y = 0; y < foveal.height(); ++y)
         for (int x = 0; x < foveal.width(); ++x) {
             const cv::Vec2f red_green = planes[0].at<cv::Vec2f>(y, x);
-            const cv::Vec2f blue_weight = planes[1].at<cv::Vec2f>(y, x);
-            const float weight = blue_weight[1] / unit;
+            const float blue = planes[1].at<cv::Vec2f>(y, x)[0];
+            const float weight = weights_(x, y);
             // A picture of one place has nothing around it.
-            if (weight < 1e-3f)
-                veil(x, y) = foveal(x, y);
-            else
-                veil(x, y) =
-                    glm::max(Rgb(red_green[0], red_green[1], blue_weight[0]), Rgb(0.0f)) / weight;
+            veil(x, y) = weight < 1e-3f
+                             ? foveal(x, y)
+                             : glm::max(Rgb(red_green[0], red_green[1], blue), Rgb(0.0f)) / weight;
         }
     return veil;
 }

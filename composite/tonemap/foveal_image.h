@@ -39,14 +39,31 @@ private:
     float open_weight_ = 0.0f;
 };
 
-/// Veiling luminance at each place: mean of all other places weighted with cos(angle) / angle², the
-/// angle a degree for each foveal pixel, below 90°.
-///
-/// One kernel for all places, so the sum is a convolution, done in the frequency plane: its cost
-/// hardly grows with the field. Linear perspective makes the outer pixels of a wide field smaller
-/// than a degree; the kernel leaves this aside, as [Mollis04] 5.3 does.
-/// Source: [Ward97] 4.4, with [Mollis04] 5.3's fixed kernel.
-[[nodiscard]] Image<Rgb> veilingLuminance(const Image<Rgb>& foveal);
+/// The kernel of veiling luminance for foveal images of one size: cos(angle) / angle², the angle a
+/// degree for each foveal pixel, below 90°, in the frequency plane. Of frames of one size it is
+/// made once.
+class VeilKernel {
+public:
+    VeilKernel() = default;
+    VeilKernel(int width, int height);
+
+    [[nodiscard]] bool isFor(const Image<Rgb>& foveal) const
+    {
+        return foveal.width() == weights_.width() && foveal.height() == weights_.height();
+    }
+    /// Veiling luminance at each place of a foveal image of this size: mean of all other places,
+    /// weighted with the kernel.
+    ///
+    /// One kernel for all places, so the sum is a convolution: its cost hardly grows with the
+    /// field. Linear perspective makes the outer pixels of a wide field smaller than a degree; the
+    /// kernel leaves this aside, as [Mollis04] 5.3 does.
+    /// Source: [Ward97] 4.4, with [Mollis04] 5.3's fixed kernel.
+    [[nodiscard]] Image<Rgb> veil(const Image<Rgb>& foveal) const;
+
+private:
+    Image<float> spectrum_;  ///< real, since the kernel is even; padded
+    Image<float> weights_;   ///< sum of the weights of all other places
+};
 
 /// Part of the light that scatters, K of [Ward97] 4.4.
 constexpr float kScattered = 0.087f;

@@ -10,6 +10,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
+#include <mutex>
 #include <numbers>
 #include <span>
 
@@ -50,23 +53,53 @@ Between between(int i, int pixels, int places)
 
 /// Display luminance over luminance, from the curve; below its first point a straight line to
 /// black.
-float gainOf(const HistogramCurve& curve, float luminance)
+class Gain {
+public:
+    explicit Gain(const HistogramCurve& curve)
+        : curve_(curve.display),
+          first_(static_cast<float>(curve.log_first)),
+          per_log_(static_cast<float>(1.0 / curve.log_step)),
+          last_(static_cast<float>(curve.display.size() - 1)),
+          darkest_(curve.display.front() / std::exp(first_))
+    {
+    }
+    [[nodiscard]] float of(float luminance) const
+    {
+        const float log = tonemap::logOf(luminance);
+        if (!(luminance > 0.0f) || log <= first_) return darkest_;
+        const float position = std::min((log - first_) * per_log_, last_);
+        const auto i = static_cast<std::size_t>(std::min(position, last_ - 1.0f));
+        const float share = position - static_cast<float>(i);
+        return (curve_[i] + share * (curve_[i + 1] - curve_[i])) / luminance;
+    }
+
+private:
+    std::span<const float> curve_;
+    float first_, per_log_, last_, darkest_;
+};
+
+/// Luminance from which on the eye resolves this many cycles per degree; infinite when it never
+/// does.
+float resolvingLuminance(double cycles_per_degree)
 {
-    const auto first = static_cast<float>(curve.log_first);
-    const float last = static_cast<float>(curve.display.size() - 1);
-    const float log = tonemap::logOf(luminance);
-    if (!(luminance > 0.0f) || log <= first) return curve.display.front() / std::exp(first);
-    const float position = std::min((log - first) / static_cast<float>(curve.log_step), last);
-    const auto i = static_cast<std::size_t>(std::min(position, last - 1.0f));
-    const float share = position - static_cast<float>(i);
-    return (curve.display[i] + share * (curve.display[i + 1] - curve.display[i])) / luminance;
+    double low = -12.0;
+    double high = 12.0;
+    if (acuity(std::pow(10.0, high)) < cycles_per_degree)
+        return std::numeric_limits<float>::infinity();
+    for (int step = 0; step < 60; ++step) {
+        const double middle = 0.5 * (low + high);
+        (acuity(std::pow(10.0, middle)) < cycles_per_degree ? low : high) = middle;
+    }
+    return static_cast<float>(std::pow(10.0, high));
 }
+
+/// Below it not all is seen by cones.
+constexpr float kCones = 5.6f;
 
 /// Cones fade out and rods, which see no colour, take over.
 Rgb mesopic(const Rgb& color)
 {
     const auto cones = static_cast<float>(coneShare(static_cast<double>(luminance(color))));
-    if (cones >= 1.0f) return color;
     return cones * color + (1.0f - cones) * Rgb(static_cast<float>(scotopicLuminance(color)));
 }
 
@@ -79,13 +112,31 @@ struct Observer {
     float deepest = 0.0f;  ///< level of the pyramid
 };
 
+/// The veil's kernel of the last size that was asked for: frames share it.
+class KeptKernel {
+public:
+    [[nodiscard]] std::shared_ptr<const tonemap::VeilKernel> of(const Image<Rgb>& foveal)
+    {
+        const std::lock_guard lock(mutex_);
+        if (!kernel_ || !kernel_->isFor(foveal))
+            kernel_ = std::make_shared<const tonemap::VeilKernel>(foveal.width(), foveal.height());
+        return kernel_;
+    }
+
+private:
+    std::mutex mutex_;
+    std::shared_ptr<const tonemap::VeilKernel> kernel_;
+};
+
 class HistogramMapping : public SceneMapping {
 public:
     HistogramMapping(const HistogramAdjustmentOptions& options,
+                     std::shared_ptr<KeptKernel> kernels,
                      int width,
                      int height,
                      const SceneStatistics& statistics)
         : options_(options),
+          kernels_(std::move(kernels)),
           width_(width),
           foveal_(width, height, options.field_of_view_deg * std::numbers::pi / 180.0)
     {
@@ -106,8 +157,17 @@ public:
     {
         const AcuityPyramid pyramid(strip, levels());
         progress.checkpoint();
+        std::vector<Between> across;
+        for (int x = 0; x < strip.width(); ++x)
+            across.push_back(between(x, strip.width(), observer_.places.width()));
+        const Gain gain(observer_.curve);
         parallelFor(0, display.height(), [&](std::int64_t row) {
-            mapRow(pyramid, strip, top + static_cast<int>(row), display.row(static_cast<int>(row)));
+            mapRow(pyramid,
+                   strip,
+                   across,
+                   gain,
+                   top + static_cast<int>(row),
+                   display.row(static_cast<int>(row)));
         });
     }
 
@@ -122,7 +182,8 @@ private:
         observer.places = Image<Place>(foveal.width(), foveal.height());
         if (options_.veil) {
             observer.direct = 1.0f - tonemap::kScattered;
-            const Image<Rgb> veil = tonemap::veilingLuminance(foveal);
+            const auto kernel = kernels_->of(foveal);
+            const Image<Rgb> veil = kernel->veil(foveal);
             for (std::size_t i = 0; i < foveal.pixelCount(); ++i) {
                 observer.places.pixels()[i].veil = tonemap::kScattered * veil.pixels()[i];
                 foveal.pixels()[i] =
@@ -131,6 +192,7 @@ private:
         }
         // Equation 5.3: what the picture itself resolves in the middle, cycles per degree.
         const double resolved = 0.5 * width_ / options_.field_of_view_deg;
+        const float sharp = resolvingLuminance(resolved);
         std::vector<float> adaptation(foveal.pixelCount());
         parallelFor(0, foveal.height(), [&](std::int64_t row) {
             for (int x = 0; x < foveal.width(); ++x) {
@@ -138,7 +200,7 @@ private:
                 const float light = luminance(foveal(x, y));
                 adaptation[static_cast<std::size_t>(y) * static_cast<std::size_t>(foveal.width()) +
                            static_cast<std::size_t>(x)] = light;
-                if (!options_.acuity) continue;
+                if (!options_.acuity || light >= sharp) continue;
                 const double level = std::log2(resolved / acuity(static_cast<double>(light)));
                 observer.places(x, y).level = static_cast<float>(std::max(0.0, level));
             }
@@ -151,6 +213,8 @@ private:
 
     void mapRow(const AcuityPyramid& pyramid,
                 const SceneStrip& scene,
+                std::span<const Between> across,
+                const Gain& gain,
                 int y,
                 std::span<Rgb> display) const
     {
@@ -161,20 +225,26 @@ private:
         for (int i = 0; i < places.width(); ++i)
             line[static_cast<std::size_t>(i)] =
                 mix(places(i, down.index), places(i, down.next), down.share);
-        for (int x = 0; x < scene.width(); ++x) {
-            const Between across = between(x, scene.width(), places.width());
-            const Place place = mix(line[static_cast<std::size_t>(across.index)],
-                                    line[static_cast<std::size_t>(across.next)],
-                                    across.share);
-            const Rgb light = observer.scale * pyramid.sample(x, y, place.level);
-            Rgb color = observer.direct * light + place.veil;
-            if (options_.color) color = mesopic(color);
-            display[static_cast<std::size_t>(x)] =
-                glm::min(color * gainOf(observer.curve, luminance(color)), Rgb(1.0f));
+        const auto pixels = scene.row(y);
+        for (std::size_t x = 0; x < across.size(); ++x) {
+            const Place place = mix(line[static_cast<std::size_t>(across[x].index)],
+                                    line[static_cast<std::size_t>(across[x].next)],
+                                    across[x].share);
+            const Rgb light = place.level > 0.0f
+                                  ? pyramid.sample(static_cast<int>(x), y, place.level)
+                                  : pixels[x];
+            Rgb color = observer.direct * observer.scale * light + place.veil;
+            float level = luminance(color);
+            if (options_.color && level < kCones) {
+                color = mesopic(color);
+                level = luminance(color);
+            }
+            display[x] = glm::min(color * gain.of(level), Rgb(1.0f));
         }
     }
 
     HistogramAdjustmentOptions options_;
+    std::shared_ptr<KeptKernel> kernels_;
     int width_;
     tonemap::FovealImage foveal_;
     Observer observer_;
@@ -187,11 +257,12 @@ public:
     [[nodiscard]] std::unique_ptr<SceneMapping> begin(
         int width, int height, const SceneStatistics& statistics) const override
     {
-        return std::make_unique<HistogramMapping>(options_, width, height, statistics);
+        return std::make_unique<HistogramMapping>(options_, kernels_, width, height, statistics);
     }
 
 private:
     HistogramAdjustmentOptions options_;
+    std::shared_ptr<KeptKernel> kernels_ = std::make_shared<KeptKernel>();
 };
 
 }  // namespace

@@ -91,7 +91,8 @@ TEST(FovealImage, HasAPixelADegreeAndKeepsTheMean)
 TEST(VeilingLuminance, EqualsTheDirectSum)
 {
     const Image<Rgb> foveal = tone_scenes::noise(50, 31, 4.0f);
-    const Image<Rgb> veil = tonemap::veilingLuminance(foveal);
+    const tonemap::VeilKernel kernel(50, 31);
+    const Image<Rgb> veil = kernel.veil(foveal);
     for (const auto& [x, y] : {std::pair{0, 0}, {49, 30}, {25, 15}, {3, 28}}) {
         glm::dvec3 sum(0.0);
         double weights = 0.0;
@@ -106,7 +107,9 @@ TEST(VeilingLuminance, EqualsTheDirectSum)
         for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(veil(x, y)[c] / (sum[c] / weights), 1.0, tolerance::kQuadrature);
     }
-    EXPECT_EQ(tonemap::veilingLuminance(Image<Rgb>(1, 1, Rgb(2.0f)))(0, 0), Rgb(2.0f));
+    EXPECT_EQ(tonemap::VeilKernel(1, 1).veil(Image<Rgb>(1, 1, Rgb(2.0f)))(0, 0), Rgb(2.0f));
+    EXPECT_FALSE(kernel.isFor(Image<Rgb>(31, 50)));
+    EXPECT_THROW((void)kernel.veil(Image<Rgb>(31, 50)), LogicError);
 }
 
 TEST(AcuityPyramid, LevelsAreMeansAndBlendBetween)
