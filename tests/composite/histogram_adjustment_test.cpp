@@ -112,6 +112,24 @@ TEST(VeilingLuminance, EqualsTheDirectSum)
     EXPECT_THROW((void)kernel.veil(Image<Rgb>(31, 50)), LogicError);
 }
 
+// Light from 89 degrees away scatters a little, from 91 none.
+TEST(VeilingLuminance, EndsAtARightAngle)
+{
+    Image<Rgb> foveal(130, 3, Rgb(0.0f));
+    foveal(0, 1) = Rgb(1e6f);
+    const Image<Rgb> veil = tonemap::VeilKernel(130, 3).veil(foveal);
+    double weights = 0.0;
+    for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 130; ++x) {
+            const double degrees = std::hypot(x - 89, y - 1);
+            if (degrees > 0.0 && degrees < 90.0)
+                weights += std::cos(degrees * 0.01745) / (degrees * degrees);
+        }
+    const double expected = 1e6 * std::cos(89.0 * 0.01745) / (89.0 * 89.0) / weights;
+    EXPECT_NEAR(veil(89, 1).g, expected, 0.05 * expected);
+    EXPECT_LT(veil(91, 1).g, 0.05 * expected);
+}
+
 TEST(AcuityPyramid, LevelsAreMeansAndBlendBetween)
 {
     Image<Rgb> scene(8, 8);
@@ -235,6 +253,23 @@ TEST(HistogramAdjustment, EachPartCanBeSwitchedOffAndDoesItsWork)
     };
     EXPECT_LT(std::abs(std::log(ratioBeside(veiled))),
               0.5f * std::abs(std::log(ratioBeside(none))));
+}
+
+// In between, cones and rods share what is seen: at 3 cd/m², 0.53 of the colour is left.
+TEST(HistogramAdjustment, ColourFadesBetweenDayAndNight)
+{
+    HistogramAdjustmentOptions options;
+    options.veil = options.acuity = false;
+    options.viewing.scene_white_cd_m2 = 1.0;
+    const Rgb color = Rgb(1.0f, 0.5f, 0.5f) * (3.0f / luminance(Rgb(1.0f, 0.5f, 0.5f)));
+    const Rgb shown = mapped(Image<Rgb>(32, 32, color), options)(16, 16);
+    const double cones = coneShare(3.0);
+    const double rods = (1.0 - cones) * scotopicLuminance(color);
+    const double expected = (cones * static_cast<double>(color.r) + rods) /
+                            (cones * static_cast<double>(color.g) + rods);
+    EXPECT_NEAR(
+        static_cast<double>(shown.r) / static_cast<double>(shown.g), expected, 1e-4 * expected);
+    EXPECT_NEAR(cones, 0.535, 0.001);
 }
 
 TEST(HistogramAdjustment, HardScenes)
