@@ -109,20 +109,23 @@ void overNeighbours(Cells& cells, int reach, const Combine& combine)
     const int height = cells.rows + 2 * Cells::kMargin;
     const int width = cells.stride();
     std::vector<float> passed(cells.values.size());
-    const auto pass = [&](const std::vector<float>& from, std::vector<float>& to, int dx, int dy) {
-        for (int y = 0; y < height; ++y)
-            for (int x = 0; x < width; ++x) {
-                float value = 0.0f;
-                for (int k = -reach; k <= reach; ++k) {
-                    const int xx = std::clamp(x + k * dx, 0, width - 1);
-                    const int yy = std::clamp(y + k * dy, 0, height - 1);
-                    value = combine(value, from[static_cast<std::size_t>(yy * width + xx)]);
-                }
-                to[static_cast<std::size_t>(y * width + x)] = value;
-            }
+    std::vector<float> line(static_cast<std::size_t>(width + 2 * reach));
+    const auto join = [&](float* __restrict to, const float* from) {
+        for (int x = 0; x < width; ++x)
+            to[x] = combine(to[x], from[x]);
     };
-    pass(cells.values, passed, 1, 0);
-    pass(passed, cells.values, 0, 1);
+    for (int y = 0; y < height; ++y) {
+        const float* const row = cells.values.data() + y * width;
+        for (int i = 0; i < std::ssize(line); ++i)
+            line[static_cast<std::size_t>(i)] = row[std::clamp(i - reach, 0, width - 1)];
+        for (int k = 0; k <= 2 * reach; ++k)
+            join(passed.data() + y * width, line.data() + k);
+    }
+    std::ranges::fill(cells.values, 0.0f);
+    for (int y = 0; y < height; ++y)
+        for (int k = -reach; k <= reach; ++k)
+            join(cells.values.data() + y * width,
+                 passed.data() + std::clamp(y + k, 0, height - 1) * width);
 }
 
 }  // namespace

@@ -57,11 +57,13 @@ public:
 
     [[nodiscard]] int halo() const override { return Cells::kHalo; }
 
+    [[nodiscard]] bool expectsWholeTiles() const override { return importance_.empty(); }
+
     WantedBlocks weigh(const LuminancePatch& patch,
                        const ToneCurve& /*curve*/,
                        int x0,
                        int y0,
-                       float* weights) const override
+                       std::vector<float>& weights) const override
     {
         Cells cells(patch.width / Cells::kSize, patch.height / Cells::kSize);
         if (importance_.empty())
@@ -70,21 +72,17 @@ public:
             markPeaks(importance_, threshold_, false, x0, y0, cells);
         if (!always_.empty()) markPeaks(always_, 0.0f, true, x0, y0, cells);
         // Plain tiles, important or not, need neither spreading nor blending.
-        const auto all = [&](float value) {
+        const auto all = [&cells](float value) {
             return std::all_of(cells.values.begin(), cells.values.end(), [&](float cell) {
                 return cell == value;
             });
         };
         if (all(0.0f)) return tonemap::uniformBlocks(patch, 0);
-        if (all(1.0f)) {
-            std::fill_n(
-                weights,
-                static_cast<std::size_t>(patch.width) * static_cast<std::size_t>(patch.height),
-                1.0f);
-            return tonemap::uniformBlocks(patch, 1);
-        }
+        if (all(1.0f)) return tonemap::uniformBlocks(patch, 1);
         tonemap::spreadCells(cells);
-        return tonemap::weighPixels(cells, patch.width, patch.height, weights);
+        weights.resize(static_cast<std::size_t>(patch.width) *
+                       static_cast<std::size_t>(patch.height));
+        return tonemap::weighPixels(cells, patch.width, patch.height, weights.data());
     }
 
 private:
@@ -176,9 +174,8 @@ double selectedShare(const SeparableOperator& tone_map,
                                                             tonemap::kTileHeight,
                                                             selected.halo(),
                                                             curve->scale());
-            std::vector<float> weights(static_cast<std::size_t>(patch.width) *
-                                       static_cast<std::size_t>(patch.height));
-            const WantedBlocks found = selected.weigh(patch, *curve, x, y, weights.data());
+            std::vector<float> weights;
+            const WantedBlocks found = selected.weigh(patch, *curve, x, y, weights);
             wanted += static_cast<std::size_t>(
                 std::count(found.wanted.begin(), found.wanted.end(), std::uint8_t{1}));
             blocks += found.wanted.size();

@@ -101,7 +101,29 @@ void blendLocal(const Tile& tile,
     }
 }
 
-/// What a tile's pixels adapt to by importance.
+/// The same from the patch itself, which holds all that the local part looks at.
+void blendWhole(const LuminancePatch& patch,
+                const LocalAdaptation& local,
+                const WantedBlocks& blocks,
+                const std::vector<float>& weights,
+                float* adapted)
+{
+    const std::ptrdiff_t half = patch.width / 2;
+    local.adapt(patch, blocks, adapted);
+    if (weights.empty()) return;
+    const auto blend = [&](std::ptrdiff_t at, const float* own) {
+        const float* const weight = weights.data() + at;
+        float* const out = adapted + at;
+        for (std::ptrdiff_t i = 0; i < half; ++i)
+            out[i] = (1.0f - weight[i]) * own[i] + weight[i] * out[i];
+    };
+    for (int y = 0; y < patch.height; ++y) {
+        blend(y * 2 * half, patch.even(y));
+        blend(y * 2 * half + half, patch.odd(y));
+    }
+}
+
+/// What a tile's pixels adapt to by importance; null: each to itself.
 Luminances adaptSelected(const Tile& tile,
                          const LuminancePatch& patch,
                          const LocalAdaptation& local,
@@ -109,17 +131,24 @@ Luminances adaptSelected(const Tile& tile,
 {
     const std::size_t pixels =
         static_cast<std::size_t>(patch.width) * static_cast<std::size_t>(patch.height);
+    std::vector<float> weights;
+    const WantedBlocks blocks =
+        importance.weigh(patch, tile.curve, tile.box.left, tile.box.top, weights);
+    if (!blocks.any()) return nullptr;
     Luminances adapted(new float[pixels]);
+    if (patch.halo >= local.halo() &&
+        std::ranges::count(blocks.wanted, std::uint8_t{1}) == std::ssize(blocks.wanted)) {
+        blendWhole(patch, local, blocks, weights, adapted.get());
+        return adapted;
+    }
+    weights.resize(pixels, 1.0f);
     const auto half = static_cast<std::size_t>(patch.width / 2);
     for (int y = 0; y < patch.height; ++y) {
         float* const row = adapted.get() + 2 * half * static_cast<std::size_t>(y);
         std::copy_n(patch.even(y), half, row);
         std::copy_n(patch.odd(y), half, row + half);
     }
-    std::vector<float> weights(pixels, 0.0f);
-    const WantedBlocks blocks =
-        importance.weigh(patch, tile.curve, tile.box.left, tile.box.top, weights.data());
-    if (blocks.any()) blendLocal(tile, patch, local, blocks, weights, adapted.get());
+    blendLocal(tile, patch, local, blocks, weights, adapted.get());
     return adapted;
 }
 
@@ -159,9 +188,9 @@ void mapTile(const Tile& tile,
              int top,
              Image<Rgb>& display)
 {
-    const int halo = importance != nullptr ? importance->halo()
-                     : local != nullptr    ? local->halo()
-                                           : 0;
+    int halo = importance != nullptr ? importance->halo() : 0;
+    if (local != nullptr && (importance == nullptr || importance->expectsWholeTiles()))
+        halo = std::max(halo, local->halo());
     const LuminancePatch patch = readPatch(tile.scene,
                                            tile.box.left,
                                            tile.box.top,

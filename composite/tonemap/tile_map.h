@@ -11,14 +11,16 @@ public:
 
     /// How far around a tile it looks: pixels, a multiple of 4.
     [[nodiscard]] virtual int halo() const = 0;
+    /// Whether most tiles will count wholly: then they are read once for both parts.
+    [[nodiscard]] virtual bool expectsWholeTiles() const = 0;
     /// Weight of the local part, row-major `patch.width` wide with each row's even columns first,
-    /// in [0, 1], for the tile at (x0, y0) of the picture. Returns the blocks with any weight above
-    /// 0.
+    /// in [0, 1], for the tile at (x0, y0) of the picture; `weights`, empty before, stays so when
+    /// they are all 0 or all 1. Returns the blocks with any weight above 0.
     virtual WantedBlocks weigh(const LuminancePatch& patch,
                                const ToneCurve& curve,
                                int x0,
                                int y0,
-                               float* weights) const = 0;
+                               std::vector<float>& weights) const = 0;
 };
 
 /// All of a tile's blocks alike: 1 wanted, 0 not.
