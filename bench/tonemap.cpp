@@ -12,6 +12,7 @@
 // pictures above 6 megapixels in their middle 2048x2048 pixels. Below 3 megapixels the local
 // operator is also compared with its direct evaluation. The local operator is Ashikhmin's, or with
 // --reinhard Reinhard's.
+#include "bench/fiv_report.h"
 #include "composite/tonemap/ashikhmin.h"
 #include "composite/tonemap/frame_mapper.h"
 #include "composite/tonemap/histogram_adjustment.h"
@@ -323,12 +324,21 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
     const double local_seconds = timed(*operator_whole, ltm);
     const double selective_seconds = timed(*selective, stm);
     const double megapixels = 1e-6 * static_cast<double>(scene.pixelCount());
+    const auto by_clock = [&](int threads) {
+        setThreadCount(threads);
+        return megapixels / report::fastest(options.runs, [&] {
+                                operator_whole->mapInto(ltm, scene, statistics, silent);
+                            }).wall;
+    };
+    const double one_thread = by_clock(1);
+    const double all_threads = by_clock(0);
+    setThreadCount(1);
     const Errors global_errors = errorsOf(ltm, gtm);
     const Errors selective_errors = errorsOf(ltm, stm);
     std::cout << fmt::format(
         "{}\n  {}x{}, selected {:.1f} %, statistics {:.1f} MPix/s\n"
         "  GTM {:.1f} MPix/s, SSIM {:.4f}, VDP {:.2f} %, gain {:.2f}\n"
-        "  LTM {:.1f} MPix/s, with statistics {:.1f}\n"
+        "  LTM {:.1f} MPix/s, with statistics {:.1f}; by the clock {:.1f}, on all threads {:.1f}\n"
         "  STM {:.1f} MPix/s, {:.2f} times LTM, SSIM {:.4f}, VDP {:.2f} %, gain {:.2f}\n",
         argument,
         scene.width(),
@@ -341,6 +351,8 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
         1.0 / (global_seconds * std::max(global_errors.vdp_percent, 0.01)),
         megapixels / local_seconds,
         megapixels / (local_seconds + measuring),
+        one_thread,
+        all_threads,
         megapixels / selective_seconds,
         local_seconds / selective_seconds,
         selective_errors.ssim,
