@@ -146,28 +146,33 @@ GlossyLobe glossyLobe(const SurfaceMaterial& m)
     return lobe;
 }
 
-Rgb glossyRadiance(const FivScene& scene,
-                   const SurfacePoint& point,
-                   glm::dvec3 wo,
-                   Rgb spots_received,
-                   const LobeDraw& draw)
+Gloss glossyRadiance(const FivScene& scene,
+                     const SurfacePoint& point,
+                     glm::dvec3 wo,
+                     Rgb spots_received,
+                     const LobeDraw& draw)
 {
     const GlossyLobe lobe = glossyLobe(point.material);
     const glm::dvec3 normal = point.shading_normal;
     const Rgb reflectance = reflectanceOf(lobe, std::max(glm::dot(normal, wo), 0.0));
-    if (point.material.roughness < kMirror)
-        return reflectance * arriving(scene,
-                                      point,
-                                      glm::reflect(-wo, normal),
-                                      /*with_spots=*/true,
-                                      /*bounces=*/1);
+    Gloss gloss;
+    if (point.material.roughness < kMirror) {
+        gloss.sharp = reflectance * arriving(scene,
+                                             point,
+                                             glm::reflect(-wo, normal),
+                                             /*with_spots=*/true,
+                                             /*bounces=*/1);
+        return gloss;
+    }
     const float share = std::min(luminance(reflectance), 1.0f);
     const int directions =
         kLeastDirections +
         static_cast<int>(std::lround(share * (kMostDirections - kLeastDirections)));
-    Rgb sum = reflectance * meanOfLobe(scene, point, wo, directions, draw);
-    if (spots_received != Rgb(0.0f)) sum += spotsOfLobe(scene, point, wo, lobe, spots_received);
-    return sum;
+    gloss.reflectance = reflectance;
+    gloss.gathered = reflectance * meanOfLobe(scene, point, wo, directions, draw);
+    if (spots_received != Rgb(0.0f))
+        gloss.sharp = spotsOfLobe(scene, point, wo, lobe, spots_received);
+    return gloss;
 }
 
 }  // namespace insitu

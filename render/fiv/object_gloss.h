@@ -21,19 +21,23 @@ struct LobeDraw {
     }
 };
 
-/// Radiance towards `wo` by the part of a material's reflection that depends on where the viewer
-/// is.
-///
+/// Radiance towards a viewer by the part of a material's reflection that depends on where it is.
+struct Gloss {
+    Rgb reflectance{0.0f};  ///< of the lobe, for what it gathers; 0 for mirrors
+    Rgb gathered{0.0f};     ///< radiance by a few directions: to be smoothed (gloss_filter.h)
+    Rgb sharp{0.0f};        ///< radiance of mirrors, and by spots
+};
+
 /// A few directions are drawn from the lobe and followed. Where one meets an object it brings what
 /// that reflects evenly, and, where that is glossy too, what lies ahead of it there; else the
 /// room's radiance. The light of spots comes one by one. Mirrors follow one direction, spots and
 /// all.
 /// `spots_received`: irradiance of spots at the point, what is hidden of it taken off.
-[[nodiscard]] Rgb glossyRadiance(const FivScene& scene,
-                                 const SurfacePoint& point,
-                                 glm::dvec3 wo,
-                                 Rgb spots_received,
-                                 const LobeDraw& draw);
+[[nodiscard]] Gloss glossyRadiance(const FivScene& scene,
+                                   const SurfacePoint& point,
+                                   glm::dvec3 wo,
+                                   Rgb spots_received,
+                                   const LobeDraw& draw);
 
 /// The glossy lobe of a material: that of a metal, times a factor.
 struct GlossyLobe {

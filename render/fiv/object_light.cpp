@@ -259,16 +259,17 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
     return result;
 }
 
-Rgb ObjectShading::radiance(const SurfacePoint& point,
-                            glm::dvec3 wo,
-                            const Received& received,
-                            const LobeDraw& draw) const
+Gloss ObjectShading::radiance(const SurfacePoint& point,
+                              glm::dvec3 wo,
+                              const Received& received,
+                              const LobeDraw& draw) const
 {
+    Gloss seen;
+    if (isGlossy(point.material)) seen = glossyRadiance(scene_, point, wo, received.spots, draw);
     const double cosine = std::abs(glm::dot(point.shading_normal, wo));
-    Rgb sum = point.material.emissive +
-              diffuseReflectance(point.material, cosine) * (received.smooth + received.spots) / kPi;
-    if (isGlossy(point.material)) sum += glossyRadiance(scene_, point, wo, received.spots, draw);
-    return sum;
+    seen.sharp += point.material.emissive + diffuseReflectance(point.material, cosine) *
+                                                (received.smooth + received.spots) / kPi;
+    return seen;
 }
 
 }  // namespace insitu

@@ -41,11 +41,11 @@ public:
     };
     [[nodiscard]] std::vector<Received> receive(std::span<const Place> places) const;
 
-    /// Radiance of a surface point towards `wo`.
-    [[nodiscard]] Rgb radiance(const SurfacePoint& point,
-                               glm::dvec3 wo,
-                               const Received& received,
-                               const LobeDraw& draw) const;
+    /// Radiance of a surface point towards `wo`: all that needs no smoothing is in `sharp`.
+    [[nodiscard]] Gloss radiance(const SurfacePoint& point,
+                                 glm::dvec3 wo,
+                                 const Received& received,
+                                 const LobeDraw& draw) const;
 
 private:
     void lookFromNodes(double spacing_m);

@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "lighting/see_through.h"
+#include "render/fiv/gloss_filter.h"
 
 #include <algorithm>
 #include <array>
@@ -156,6 +157,7 @@ std::vector<std::optional<ReceiverPlace>> renderObjectPixels(const Camera& camer
     const int columns = (width + kTile - 1) / kTile;
     const int rows = (height + kTile - 1) / kTile;
     const Tracer tracer(camera, scene);
+    GlossPixels gloss(width, height);
     parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t tile) {
         if (progress.cancelled()) return;
         const int x0 = static_cast<int>(tile) % columns * kTile;
@@ -178,18 +180,32 @@ std::vector<std::optional<ReceiverPlace>> renderObjectPixels(const Camera& camer
             }
         const auto received = shading.receive(places);
         for (const PixelPoints& pixel : pixels) {
-            Rgb sum(0.0f);
-            for (std::size_t i = 0; i < pixel.points.size(); ++i)
-                sum += shading.radiance(pixel.points[i],
-                                        pixel.toward_camera[i],
-                                        received[pixel.place[i]],
-                                        LobeDraw::of(pixel.pixel, static_cast<int>(i)));
-            layers.alpha(pixel.pixel.x, pixel.pixel.y) = pixel.alpha;
-            layers.object(pixel.pixel.x, pixel.pixel.y) =
-                sum * (pixel.alpha / static_cast<float>(pixel.points.size()));
+            Gloss sum;
+            for (std::size_t i = 0; i < pixel.points.size(); ++i) {
+                const Gloss seen = shading.radiance(pixel.points[i],
+                                                    pixel.toward_camera[i],
+                                                    received[pixel.place[i]],
+                                                    LobeDraw::of(pixel.pixel, static_cast<int>(i)));
+                sum.sharp += seen.sharp;
+                sum.gathered += seen.gathered;
+                sum.reflectance += seen.reflectance;
+            }
+            const int x = pixel.pixel.x;
+            const int y = pixel.pixel.y;
+            const float share = pixel.alpha / static_cast<float>(pixel.points.size());
+            layers.alpha(x, y) = pixel.alpha;
+            layers.object(x, y) = sum.sharp * share;
+            const SurfacePoint& first = pixel.points.front();
+            gloss.gathered(x, y) = sum.gathered * share;
+            gloss.reflectance(x, y) = sum.reflectance * share;
+            gloss.normal(x, y) = glm::vec3(first.shading_normal);
+            gloss.roughness(x, y) = first.material.roughness;
+            gloss.depth_m(x, y) = static_cast<float>(first.distance_m);
+            gloss.object(x, y) = static_cast<std::uint32_t>(first.object);
         }
     });
     progress.checkpoint();
+    addSmoothedGloss(gloss, layers.object);
     return receivers;
 }
 

@@ -122,6 +122,36 @@ TEST_P(GlossyObjects, LookAsTheReferenceRendersThem)
     EXPECT_LT(std::sqrt(off / level), 0.12);
 }
 
+// A few directions a pixel hit the window or do not: no pixel may show it.
+TEST(GlossyObject, IsSmooth)
+{
+    EnvironmentMap sky = uniform(0.5f);
+    for (int y = 16; y < 24; ++y)
+        for (int x = 24; x < 32; ++x)
+            sky.pixels(x, y) = Rgb(100.0f);
+    const SceneProxy proxy(closedRoom());
+    const RoomLight light(proxy, sky, {0, 1, 0}, std::nullopt, coarse(), g_silent);
+    const Camera camera = Camera::lookAt({0.9, 1.3, 1.6}, {0, 0.45, 0}, 220.0, 48, 48);
+    for (const float roughness : {0.4f, 0.7f}) {
+        std::vector<ObjectScene::Object> objects;
+        objects.push_back(
+            {shapes::model(shapes::sphere({0, 0.45f, 0}, 0.4f, 64), metal(roughness)), {}});
+        const RenderLayers layers =
+            renderInsertion(camera, light, ObjectScene(std::move(objects)), fiv(), g_silent).layers;
+        // Second differences along rows in the ball's middle, beside its level.
+        double bend = 0.0;
+        double level = 0.0;
+        for (int y = 18; y < 30; ++y)
+            for (int x = 18; x < 30; ++x) {
+                const auto at = [&](int u) { return static_cast<double>(layers.object(u, y).g); };
+                bend += std::pow(at(x - 1) - 2.0 * at(x) + at(x + 1), 2.0);
+                level += at(x) * at(x);
+            }
+        // Unsmoothed it is above 1.
+        EXPECT_LT(std::sqrt(bend / level), 0.1) << roughness;
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Roughnesses, GlossyObjects, ::testing::Values(0.05f, 0.2f, 0.4f, 0.8f));
 
 }  // namespace
