@@ -322,7 +322,7 @@ void twoOccluders(report::Table& table, const Stage& stage, const TexelLight& li
     const Stopwatch watch;
     pair.hiddenIrradiance(places, kUp, hidden);
     const double shade = watch.passed().processor;
-    const Rgb free = freeIrradiance(one.light, kUp);
+    const Rgb free = one.light.irradiance(kUp);
     Picture picture(stage.floor.side, stage.floor.side);
     for (std::size_t i = 0; i < hidden.size(); ++i)
         picture(stage.pixels[i].x, stage.pixels[i].y) = free - hidden[i];

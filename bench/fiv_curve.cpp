@@ -98,7 +98,7 @@ public:
     {
         const ObjectLight object = lit({.max_fine_directions = 48});
         hiddenIrradiance(object, local_, kUp, hidden_);
-        chooseShadow(freeIrradiance(object.light, kUp));
+        chooseShadow(object.light.irradiance(kUp));
         trace();
         report::Table::printHead();
         for (const int fine : {0, 16, 48})
@@ -141,7 +141,7 @@ private:
     {
         const DirectionCells cells{128};
         const CellLight light = splitLight(environment_, glm::dmat3(1.0), cells, {2000, 1e-6});
-        const Rgb free = freeIrradiance(light, kUp);
+        const Rgb free = light.irradiance(kUp);
         const double radius = stage_.local().radius;
         truth_.resize(pixels_.size());
         parallelFor(0, static_cast<std::int64_t>(pixels_.size()), [&](std::int64_t task) {
@@ -202,7 +202,7 @@ private:
         const double before = lighting.passed().processor;
         const auto shade =
             report::fastest(3, [&] { hiddenIrradiance(object, local_, kUp, hidden_); });
-        const Rgb free = freeIrradiance(object.light, kUp);
+        const Rgb free = object.light.irradiance(kUp);
         add(fmt::format("ours, exact, {} fine directions", object.light.fine.size()),
             before,
             shade,
@@ -217,7 +217,7 @@ private:
         const double before = lighting.passed().processor;
         double share = 0.0;
         const auto shade = report::fastest(3, [&] { share = frameOf(object, max_error); });
-        const Rgb free = freeIrradiance(object.light, kUp);
+        const Rgb free = object.light.irradiance(kUp);
         add(fmt::format("ours, {:.0f} % of the pixels", 100.0 * share),
             before,
             shade,
@@ -249,7 +249,7 @@ private:
                 }
             });
         });
-        const Rgb free = freeIrradiance(object.light, kUp);
+        const Rgb free = object.light.irradiance(kUp);
         add("ours, plane", before, shade, field.memoryBytes(), errorOf([&](std::size_t i) {
                 return free - hidden_[pixels_[i]];
             }));
@@ -262,7 +262,7 @@ private:
         const double before = building.passed().processor;
         const auto shade =
             report::fastest(3, [&] { field.hiddenIrradiance(local_, normals, hidden_); });
-        const Rgb free = freeIrradiance(object.light, kUp);
+        const Rgb free = object.light.irradiance(kUp);
         add("ours, shells 128x65x30",
             before,
             shade,

@@ -151,7 +151,7 @@ void row(const std::string& name,
     stage.atlas = buildVisibilityAtlas(mesh, {}, silent);
     const ObjectLight object = litByTexels(stage, light, 0);
     const ShellField field(object, {128, 65, 30, 0.35, kReach});
-    const Rgb free = freeIrradiance(object.light, kUp);
+    const Rgb free = object.light.irradiance(kUp);
     const Crowd crowd(
         stage.local(), boundingBox(mesh).min.y - 1e-4 * stage.local().radius, objects);
     std::vector<Rgb> shown(crowd.places.size());

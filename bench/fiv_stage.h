@@ -84,21 +84,11 @@ inline double nrmse(const Picture& truth, const Picture& picture)
     return compareImages(truth, picture)->nrmse;
 }
 
-/// Irradiance without the object.
-inline Rgb freeIrradiance(const CellLight& light, glm::vec3 normal)
-{
-    glm::dvec3 sum(0.0);
-    for (const auto* list : {&light.along, &light.against, &light.fine})
-        for (const IrradianceVector& v : *list)
-            sum += glm::dvec3(glm::max(v.along(normal), Rgb(0.0f)));
-    return Rgb(sum);
-}
-
 inline Picture exactPicture(const Stage& stage, const ObjectLight& object)
 {
     std::vector<Rgb> hidden(stage.places.size());
     hiddenIrradiance(object, stage.places, kUp, hidden);
-    const Rgb free = freeIrradiance(object.light, kUp);
+    const Rgb free = object.light.irradiance(kUp);
     Picture picture(stage.floor.side, stage.floor.side);
     for (std::size_t i = 0; i < hidden.size(); ++i)
         picture(stage.pixels[i].x, stage.pixels[i].y) = free - hidden[i];
@@ -109,7 +99,7 @@ inline Picture shellPicture(const Stage& stage, const ObjectLight& object, const
 {
     std::vector<Rgb> hidden(stage.places.size());
     field.hiddenIrradiance(stage.places, std::vector<glm::vec3>(stage.places.size(), kUp), hidden);
-    const Rgb free = freeIrradiance(object.light, kUp);
+    const Rgb free = object.light.irradiance(kUp);
     Picture picture(stage.floor.side, stage.floor.side);
     for (std::size_t i = 0; i < hidden.size(); ++i)
         picture(stage.pixels[i].x, stage.pixels[i].y) = free - hidden[i];
@@ -123,7 +113,7 @@ inline ReceiverPlane planeOf(const Floor& floor)
 
 inline Picture planePicture(const Stage& stage, const ObjectLight& object, const PlaneField& field)
 {
-    const Rgb free = freeIrradiance(object.light, kUp);
+    const Rgb free = object.light.irradiance(kUp);
     const double side = stage.floor.side;
     Picture picture(stage.floor.side, stage.floor.side);
     for (const glm::ivec2 p : stage.pixels)

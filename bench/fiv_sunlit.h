@@ -22,7 +22,7 @@ inline void lightBudget(report::Table& table, const Stage& stage, const Environm
     small.floor = floor;
     floor.tiled(stage.local(), small.places, small.pixels);
     const auto byRays = [&](const CellLight& light, DirectionCells cells) {
-        const Rgb free = freeIrradiance(light, kUp);
+        const Rgb free = light.irradiance(kUp);
         return pictureOf(floor, [&](glm::dvec3 x) {
             const glm::dvec3 to = stage.local().center - x;
             const double distance = glm::length(to);

@@ -169,7 +169,7 @@ std::vector<Rgb> irradianceAt(const View& view, const std::function<Rgb(glm::dve
 /// What is left of the free irradiance where some is hidden.
 std::vector<Rgb> left(const ObjectLight& object, std::vector<Rgb> hidden)
 {
-    const Rgb free = freeIrradiance(object.light, kUp);
+    const Rgb free = object.light.irradiance(kUp);
     for (Rgb& value : hidden)
         value = free - value;
     return hidden;
@@ -216,7 +216,7 @@ void compareLight(const Stage& stage,
     const PlaneField field(object, planeOf(stage.floor), {});
     comparison.add(name, "ours, plane", irradianceAt(view, [&](glm::dvec3 x) {
                        const glm::dvec3 from = (x - stage.floor.corner) / stage.floor.extent;
-                       return freeIrradiance(object.light, kUp) - field.at({from.x, from.z});
+                       return object.light.irradiance(kUp) - field.at({from.x, from.z});
                    }));
     hiddenIrradiance(object, places, kUp, hidden);
     comparison.add(name, "ours, exact", left(object, hidden));

@@ -28,31 +28,12 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/saliency.hpp>
 
-#include <chrono>
-#include <ctime>
 #include <iostream>
 
 namespace insitu {
 namespace {
 
-double processorSeconds()
-{
-    timespec time{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-template <class Run>
-double leastSeconds(int runs, const Run& run)
-{
-    double least = 1e300;
-    for (int i = 0; i < runs; ++i) {
-        const double start = processorSeconds();
-        run();
-        least = std::min(least, processorSeconds() - start);
-    }
-    return least;
-}
+using report::fastest;
 
 /// The operator's curve alone.
 class GlobalPart : public SeparableOperator {
@@ -214,8 +195,9 @@ void benchInserted(const BenchOptions& options,
                 selection.always(x, y) = 1.0f;
     const auto selective = makeSelective(tone_map, selection);
     Image<Rgb> display(scene.width(), scene.height());
-    const double seconds =
-        leastSeconds(options.runs, [&] { selective->mapInto(display, scene, statistics, silent); });
+    const double seconds = fastest(options.runs, [&] {
+                               selective->mapInto(display, scene, statistics, silent);
+                           }).processor;
     std::cout << fmt::format("  object of {:.1f} % alone: selected {:.1f} %, {:.2f} times LTM\n",
                              100.0 * options.inserted,
                              100.0 * selectedShare(*tone_map, selection, scene),
@@ -242,9 +224,9 @@ void benchFrames(const BenchOptions& options,
         for (int y = top; y < top + static_cast<int>(side * scene.height()); ++y)
             for (int x = left; x < left + static_cast<int>(side * scene.width()); ++x)
                 moved(x, y) *= 0.8f;
-        const double start = processorSeconds();
+        const report::Stopwatch watch;
         (void)mapper.map(moved, 0.04, silent);
-        const double taken = processorSeconds() - start;
+        const double taken = watch.passed().processor;
         // The first frame, and those in which the look changes, are mapped whole.
         if (mapper.mappedShare() == 1.0) continue;
         seconds += taken;
@@ -277,25 +259,16 @@ void benchHistogram(const BenchOptions& options, const std::string& argument)
             histogram.field_of_view_deg = field;
             histogram.viewing.scene_white_cd_m2 = light / statistics.log_average;
             const auto tone_map = makeHistogramAdjustment(histogram);
-            double least = 1e300;
-            double processor = 1e300;
-            for (int i = 0; i < options.runs; ++i) {
-                const double start = processorSeconds();
-                const auto clock = std::chrono::steady_clock::now();
-                tone_map->mapInto(display, scene, statistics, silent);
-                const std::chrono::duration<double> taken =
-                    std::chrono::steady_clock::now() - clock;
-                least = std::min(least, taken.count());
-                processor = std::min(processor, processorSeconds() - start);
-            }
+            const auto spent = fastest(
+                options.runs, [&] { tone_map->mapInto(display, scene, statistics, silent); });
             std::cout << fmt::format(
                 "  {:3.0f} degrees, log average {} cd/m²: {:.1f} frames/s by the clock, {:.1f} ms "
                 "of "
                 "processors\n",
                 field,
                 light,
-                1.0 / least,
-                1e3 * processor);
+                1.0 / spent.wall,
+                1e3 * spent.processor);
         }
     std::cout << std::flush;
 }
@@ -311,11 +284,12 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
     selection.importance_threshold = options.threshold;
     const auto selective = makeSelective(operator_whole, selection);
     SceneStatistics statistics;
-    const double measuring = leastSeconds(options.runs, [&] { statistics = measureScene(scene); });
+    const double measuring =
+        fastest(options.runs, [&] { statistics = measureScene(scene); }).processor;
     const auto timed = [&](const ToneMapOperator& tone_map, Image<Rgb>& display) {
         display = Image<Rgb>(scene.width(), scene.height());
-        return leastSeconds(options.runs,
-                            [&] { tone_map.mapInto(display, scene, statistics, silent); });
+        return fastest(options.runs, [&] { tone_map.mapInto(display, scene, statistics, silent); })
+            .processor;
     };
     Image<Rgb> gtm;
     Image<Rgb> ltm;
@@ -326,7 +300,7 @@ void benchPicture(const BenchOptions& options, const std::string& argument)
     const double megapixels = 1e-6 * static_cast<double>(scene.pixelCount());
     const auto by_clock = [&](int threads) {
         setThreadCount(threads);
-        return megapixels / report::fastest(options.runs, [&] {
+        return megapixels / fastest(options.runs, [&] {
                                 operator_whole->mapInto(ltm, scene, statistics, silent);
                             }).wall;
     };

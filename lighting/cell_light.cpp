@@ -292,6 +292,15 @@ IrradianceVector CellLight::total() const
     return {{glm::vec3(sum[0]), glm::vec3(sum[1]), glm::vec3(sum[2])}};
 }
 
+Rgb CellLight::irradiance(glm::vec3 unit_normal) const
+{
+    glm::dvec3 sum(0.0);
+    for (const auto* list : {&along, &against, &fine})
+        for (const IrradianceVector& v : *list)
+            sum += glm::dvec3(glm::max(v.along(unit_normal), Rgb(0.0f)));
+    return Rgb(sum);
+}
+
 CellLight splitLight(const EnvironmentMap& environment,
                      const glm::dmat3& object_from_world,
                      DirectionCells cells,

@@ -76,6 +76,8 @@ struct CellLight {
 
     /// FIV of the whole environment.
     [[nodiscard]] IrradianceVector total() const;
+    /// Irradiance of a surface that faces this way, where nothing hides any of it.
+    [[nodiscard]] Rgb irradiance(glm::vec3 unit_normal) const;
 };
 
 /// `object_from_world` is a rotation. Each texel shines from its own area, cut finer than the

@@ -51,14 +51,7 @@ public:
           hidden_(hidden),
           known_(places.size(), 0)
     {
-        Rgb all(0.0f);
-        for (const IrradianceVector& v : object.light.along)
-            all += glm::max(v.along(normal), Rgb(0.0f));
-        for (const IrradianceVector& v : object.light.against)
-            all += glm::max(v.along(normal), Rgb(0.0f));
-        for (const IrradianceVector& v : object.light.fine)
-            all += glm::max(v.along(normal), Rgb(0.0f));
-        tolerance_ = static_cast<float>(options.max_error) * all;
+        tolerance_ = static_cast<float>(options.max_error) * object.light.irradiance(normal);
     }
 
     double sum()
@@ -84,8 +77,13 @@ public:
             std::vector<Square> uneven;
             for (std::size_t k = 0; k < squares.size(); ++k)
                 for (int quarter = 0; quarter < 4; ++quarter) {
-                    const Square part = squares[k].quarter(quarter % 2, quarter / 2);
-                    (even[k] ? smooth_ : uneven).push_back(part);
+                    const int i = quarter % 2;
+                    const int j = quarter / 2;
+                    // Of two pixels the first is the middle too: its half is empty.
+                    if ((i == 0 && squares[k].x[0] == squares[k].x[1]) ||
+                        (j == 0 && squares[k].y[0] == squares[k].y[1]))
+                        continue;
+                    (even[k] ? smooth_ : uneven).push_back(squares[k].quarter(i, j));
                 }
             squares = std::move(uneven);
         }
@@ -166,8 +164,7 @@ private:
     }
     void fill()
     {
-        // Each square fills its own pixels; shared edges belong to the one that ends there last in
-        // no order that matters, since both interpolate between the same two corners.
+        // Right and lower edges belong to the next square, but at the picture's own.
         parallelFor(0, static_cast<std::int64_t>(smooth_.size()), [&](std::int64_t k) {
             const Square& s = smooth_[static_cast<std::size_t>(k)];
             const int right = s.x[2] == width_ - 1 ? s.x[2] : s.x[2] - 1;

@@ -102,16 +102,6 @@ bool anyAround(const std::vector<char>& marked, std::size_t side, std::size_t ti
     return false;
 }
 
-/// Irradiance of the plane without the object, its brightest channel.
-double irradianceOf(const CellLight& light, glm::vec3 normal)
-{
-    glm::dvec3 sum(0.0);
-    for (const auto* list : {&light.along, &light.against, &light.fine})
-        for (const IrradianceVector& v : *list)
-            sum += glm::dvec3(glm::max(v.along(normal), Rgb(0.0f)));
-    return std::max({sum.x, sum.y, sum.z});
-}
-
 }  // namespace
 
 glm::dvec3 ReceiverPlane::normal() const
@@ -143,7 +133,8 @@ PlaneField::PlaneField(const ObjectLight& object,
     if (!(glm::length(glm::cross(plane.edge_u, plane.edge_v)) > 0.0))
         throw InputError("receiver plane", "its edges span no area");
     const glm::vec3 normal(plane.normal());
-    const double irradiance = irradianceOf(object.light, normal);
+    const Rgb free = object.light.irradiance(normal);
+    const double irradiance = static_cast<double>(std::max({free.r, free.g, free.b}));
     const double limit = options.max_error * irradiance;
 
     // Level by level: sample all tiles that are not good enough yet, see what their coarser samples

@@ -10,6 +10,13 @@ namespace insitu {
 
 /// Warps of the unit square, for Monte Carlo. u in [0, 1)².
 
+/// Point `number` of the R2 sequence in [0, 1)²: each beginning of it is spread evenly. Begun at
+/// `begin` instead of the middle it is another one. [Roberts18].
+[[nodiscard]] inline glm::dvec2 r2Point(double number, glm::dvec2 begin = glm::dvec2(0.5))
+{
+    return glm::fract(begin + number * glm::dvec2(0.7548776662466927, 0.5698402909980532));
+}
+
 /// Cosine-weighted direction about +z; density cos/π. [Veach97] 2.
 [[nodiscard]] inline glm::dvec3 cosineHemisphere(glm::vec2 u)
 {

@@ -18,12 +18,10 @@ using fiv::Occluder;
 using fiv::Source;
 using fiv::Sum;
 
-/// About +Y, by −rotation: from the world's axes to the object's.
+/// From the world's axes to the object's.
 glm::dvec3 turnedBack(const Placement& placement, glm::dvec3 v)
 {
-    const double c = std::cos(placement.rotation_y_rad);
-    const double s = std::sin(placement.rotation_y_rad);
-    return {c * v.x - s * v.z, v.y, s * v.x + c * v.z};
+    return v * placement.worldFromModelRotation();
 }
 
 /// The silhouette's frame for light along `wanted` instead of its own direction: a place is carried

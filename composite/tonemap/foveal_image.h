@@ -44,7 +44,6 @@ private:
 /// made once.
 class VeilKernel {
 public:
-    VeilKernel() = default;
     VeilKernel(int width, int height);
 
     [[nodiscard]] bool isFor(const Image<Rgb>& foveal) const

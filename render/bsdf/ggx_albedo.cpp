@@ -1,5 +1,6 @@
 #include "render/bsdf/ggx_albedo.h"
 
+#include "lighting/sampling.h"
 #include "render/bsdf/ggx.h"
 
 #include <glm/glm.hpp>
@@ -38,9 +39,7 @@ Albedo integrate(double alpha, double cosine)
     const glm::dvec3 wo(std::sqrt(1.0 - cosine * cosine), 0.0, cosine);
     Albedo sum;
     for (int i = 0; i < kPoints; ++i) {
-        const glm::dvec2 u(std::fmod(0.5 + i * 0.7548776662466927, 1.0),
-                           std::fmod(0.5 + i * 0.5698402909980532, 1.0));
-        const glm::dvec3 h = drawVisibleNormal(wo, alpha, u);
+        const glm::dvec3 h = drawVisibleNormal(wo, alpha, r2Point(i));
         const double oh = glm::dot(wo, h);
         const glm::dvec3 wi = 2.0 * oh * h - wo;
         if (!(wi.z > 0.0)) continue;

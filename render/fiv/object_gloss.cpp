@@ -1,6 +1,7 @@
 #include "render/fiv/object_gloss.h"
 
 #include "core/color.h"
+#include "lighting/sampling.h"
 #include "render/bsdf/bsdf.h"
 #include "render/bsdf/ggx_albedo.h"
 #include "render/fiv/object_light.h"
@@ -83,20 +84,11 @@ Rgb meanOfLobe(const FivScene& scene,
     white.base_color = Rgb(1.0f);
     white.metallic = 1.0f;
     white.roughness = point.material.roughness;
-    const auto fraction = [](double value) {
-        return static_cast<float>(value - std::floor(value));
-    };
     Rgb sum(0.0f);
     float weights = 0.0f;
     for (int i = 0; i < directions; ++i) {
-        // Additive recurrence with the plastic number.
-        const double number = draw.point * directions + i;
-        const auto drawn = sampleBsdf(white,
-                                      point.shading_normal,
-                                      wo,
-                                      0.5f,
-                                      {fraction(draw.shift.x + 0.7548776662466927 * number),
-                                       fraction(draw.shift.y + 0.5698402909980532 * number)});
+        const glm::dvec2 u = r2Point(draw.point * directions + i, draw.shift);
+        const auto drawn = sampleBsdf(white, point.shading_normal, wo, 0.5f, glm::vec2(u));
         // What lies below the surface itself, by its own curvature, is not lit.
         if (!drawn || glm::dot(drawn->direction, point.geometric_normal) <= 0.0) continue;
         sum += drawn->weight.g *

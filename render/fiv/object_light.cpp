@@ -178,9 +178,6 @@ ObjectShading::Around ObjectShading::lookAtObjects(const Place& place) const
     point.geometric_normal = place.geometric_normal;
     const glm::dvec3 start = scene_.objects.leave(point, place.geometric_normal);
     const glm::dmat3 to_world = frameFromNormal(place.normal);
-    const auto fraction = [](double value) {
-        return static_cast<float>(value - std::floor(value));
-    };
     std::array<glm::dvec3, kNearRays> near;
     std::array<glm::dvec3, kNearRays> passed;
     std::size_t near_count = 0;
@@ -189,10 +186,7 @@ ObjectShading::Around ObjectShading::lookAtObjects(const Place& place) const
     int met_count = 0;
     int rays = kFirstRays;
     for (int i = 0; i < rays; ++i) {
-        // Additive recurrence with the plastic number: every beginning of it is even.
-        const glm::dvec3 direction =
-            to_world * cosineHemisphere({fraction(0.5 + 0.7548776662466927 * i),
-                                         fraction(0.5 + 0.5698402909980532 * i)});
+        const glm::dvec3 direction = to_world * cosineHemisphere(r2Point(i));
         // Below the surface by its own curvature, not by what lies near.
         const auto met = glm::dot(direction, place.geometric_normal) > 0.0
                              ? scene_.objects.intersect(start, direction)

@@ -1,6 +1,7 @@
 #include "render/fiv/object_samples.h"
 
 #include "core/parallel.h"
+#include "lighting/sampling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,7 +37,6 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
     }
     std::vector<ObjectSample> samples;
     if (!(total > 0.0)) return samples;
-    const auto fraction = [](double value) { return value - std::floor(value); };
     for (int i = 0; i < count; ++i) {
         const double wanted = (i + 0.5) / count * total;
         const auto found = std::lower_bound(areas.begin(), areas.end(), wanted);
@@ -49,14 +49,9 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
         const glm::dvec3 v = glm::dvec3(mesh.positions[corner.z]) - a;
         const glm::dvec3 across = glm::cross(u, v);
         if (!(glm::length(across) > 0.0)) continue;
-        // Additive recurrence with the plastic number.
-        double s = fraction(0.5 + 0.7548776662466927 * i);
-        double t = fraction(0.5 + 0.5698402909980532 * i);
-        if (s + t > 1.0) {
-            s = 1.0 - s;
-            t = 1.0 - t;
-        }
-        const glm::dvec3 place = a + s * u + t * v;
+        glm::dvec2 inside = r2Point(i);
+        if (inside.x + inside.y > 1.0) inside = 1.0 - inside;
+        const glm::dvec3 place = a + inside.x * u + inside.y * v;
         const glm::dvec3 normal = glm::normalize(across);
         const double off = 1e-4 * std::sqrt(total);
         for (const double side : {1.0, -1.0}) {

@@ -4,8 +4,6 @@
 #include "lighting/sampling.h"
 #include "render/fiv/object_samples.h"
 
-#include <cmath>
-
 namespace insitu {
 
 namespace {
@@ -23,9 +21,6 @@ SentLight::SentLight(const ObjectScene& objects, std::span<const ObjectSample> s
                             glm::vec3(sample.point.geometric_normal),
                             Rgb(0.0f)});
     open_.resize(samples.size());
-    const auto fraction = [](double value) {
-        return static_cast<float>(value - std::floor(value));
-    };
     parallelFor(0, static_cast<std::int64_t>(samples.size()), [&](std::int64_t number) {
         const auto i = static_cast<std::size_t>(number);
         const glm::dvec3 normal = samples[i].point.geometric_normal;
@@ -33,11 +28,9 @@ SentLight::SentLight(const ObjectScene& objects, std::span<const ObjectSample> s
         const glm::dmat3 to_world = frameFromNormal(normal);
         int met = 0;
         for (int k = 0; k < kRays; ++k) {
-            // Additive recurrence with the plastic number, begun elsewhere at each sample.
-            const double shift = 0.6180339887498949 * static_cast<double>(i);
-            const glm::dvec3 direction =
-                to_world * cosineHemisphere({fraction(shift + 0.7548776662466927 * k),
-                                             fraction(shift + 0.5698402909980532 * k)});
+            // Begun elsewhere at each sample.
+            const glm::dvec2 begin(0.6180339887498949 * static_cast<double>(i));
+            const glm::dvec3 direction = to_world * cosineHemisphere(r2Point(k, begin));
             met += objects.occluded(start, direction) ? 1 : 0;
         }
         open_[i] = 1.0f - static_cast<float>(met) / static_cast<float>(kRays);

@@ -50,11 +50,8 @@ Model screen(int texels, const IsHole& isHole)
 
 InsertionOptions fiv()
 {
-    InsertionOptions options;
-    options.technique = Technique::Fiv;
-    options.fiv.atlas = {16, 64, 2};
-    options.fiv.object_face_size = 8;
-    options.fiv.object_samples = 64;
+    InsertionOptions options = coarseFiv();
+    options.fiv.atlas.resolution = 64;
     return options;
 }
 

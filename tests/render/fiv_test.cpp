@@ -55,12 +55,8 @@ ObjectScene balls(const std::vector<Ball>& wanted, float albedo)
 /// Coarse enough for tests to be quick.
 InsertionOptions fiv()
 {
-    InsertionOptions options;
-    options.technique = Technique::Fiv;
-    options.fiv.atlas = {16, 48, 2};
-    options.fiv.object_face_size = 8;
+    InsertionOptions options = coarseFiv();
     options.fiv.receiver_node_spacing_m = 1.0;
-    options.fiv.object_samples = 64;
     return options;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "lighting/room_light.h"
+#include "render/renderer.h"
 
 /// Rooms and lights that the tests of insertions share.
 namespace insitu {
@@ -26,6 +27,17 @@ inline RoomLightOptions coarse()
     options.texel_m = 0.1;
     options.cell_m = 0.5;
     options.rays_per_cell = 64;
+    return options;
+}
+
+/// Technique `fiv`, likewise.
+inline InsertionOptions coarseFiv()
+{
+    InsertionOptions options;
+    options.technique = Technique::Fiv;
+    options.fiv.atlas = {16, 48, 2};
+    options.fiv.object_face_size = 8;
+    options.fiv.object_samples = 64;
     return options;
 }
 
