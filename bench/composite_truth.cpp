@@ -246,7 +246,7 @@ Touched touched(const Vec3Image& codes, const Vec3Image& plate_codes, const Mask
 
 void printScore(const std::string& room, const std::string& mode, const Score& score)
 {
-    fmt::print("{:<14} {:<11}", room, mode);
+    fmt::print("{:<14} {:<16}", room, mode);
     fmt::print(" {:>7.4f} {:>8.4f} {:>7.4f}", score.object, score.contact, score.shadow);
 }
 
@@ -274,15 +274,17 @@ struct Technique {
     std::string name;
     insitu::Technique technique = insitu::Technique::Reference;
     FivLight light = FivLight::Room;
+    bool interreflection = true;
 };
 
 Technique techniqueOf(const std::string& name)
 {
     Technique found{.name = name};
-    if (name != "reference") found.technique = insitu::Technique::Fiv;
+    if (!name.starts_with("reference")) found.technique = insitu::Technique::Fiv;
     if (name == "auto") found.technique = insitu::Technique::Auto;
     if (name == "fiv-distant") found.light = FivLight::Distant;
     if (name == "fiv-cube") found.light = FivLight::Cube;
+    found.interreflection = !name.ends_with("-direct");
     return found;
 }
 
@@ -316,6 +318,7 @@ void measure(std::filesystem::path folder, const Arguments& arguments)
             const Technique technique = techniqueOf(name);
             options.render.technique = technique.technique;
             options.render.fiv.light = technique.light;
+            options.render.interreflection.enabled = technique.interreflection;
             Progress silent;
             const InsertResult result = insertObjects(project, options, silent);
             const Vec3Image codes = eightBitCodes(result.composite.image);
@@ -364,7 +367,13 @@ int main(int argc, char** argv)
         ->delimiter(',')
         ->check(CLI::IsMember(insitu::kMatchParts));
     app.add_option("--technique", arguments.techniques, "One or several")
-        ->check(CLI::IsMember({"reference", "fiv", "auto", "fiv-distant", "fiv-cube"}))
+        ->check(CLI::IsMember({"reference",
+                               "reference-direct",
+                               "fiv",
+                               "fiv-direct",
+                               "auto",
+                               "fiv-distant",
+                               "fiv-cube"}))
         ->capture_default_str();
     app.add_option("--max-error", options.render.target_error, "As in insert")
         ->check(CLI::NonNegativeNumber)
@@ -382,7 +391,7 @@ int main(int argc, char** argv)
                options.render.max_samples,
                insitu::compositeFormName(arguments.form));
     fmt::print(
-        "room           technique    object  contact  shadow  far px  codes changed% seconds  "
+        "room           technique         object  contact  shadow  far px  codes changed% seconds  "
         "render "
         "    cpu tables samples  ratio se fiv rms  upper\n");
     try {

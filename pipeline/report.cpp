@@ -72,6 +72,13 @@ Json cameraMatchJson(const CameraMatchEstimate& estimate)
             {"focus_m", match.depth_of_field ? Json(match.depth_of_field->focus_m) : Json()}};
 }
 
+/// null where nothing was sampled.
+Json sampledErrorJson(const SampledError& error)
+{
+    if (error.pixels == 0) return {};
+    return {{"pixels", error.pixels}, {"rms", error.rms}, {"upper", error.upper}};
+}
+
 }  // namespace
 
 void writeReport(const std::filesystem::path& path,
@@ -110,11 +117,9 @@ void writeReport(const std::filesystem::path& path,
           {"stopped_by_time", result.render.stopped_by_time},
           {"ratio_standard_error", result.render.ratio_error},
           {"technique_asked", techniqueName(options.render.technique)},
-          {"fiv_error",
-           result.render.fiv_error.pixels > 0 ? Json{{"pixels", result.render.fiv_error.pixels},
-                                                     {"rms", result.render.fiv_error.rms},
-                                                     {"upper", result.render.fiv_error.upper}}
-                                              : Json()},
+          {"interreflection", options.render.interreflection.enabled},
+          {"fiv_error", sampledErrorJson(result.render.fiv_error)},
+          {"no_interreflection_error", sampledErrorJson(result.render.no_interreflection_error)},
           {"table_bytes", result.render.table_bytes},
           {"table_seconds", result.render.table_seconds}}},
         {"composite",

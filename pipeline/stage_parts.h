@@ -73,7 +73,7 @@ void parts(auto& archive, PartsOf<SampledError> auto& v)
 }
 void parts(auto& archive, PartsOf<InsertionResult> auto& v)
 {
-    archive(v.fiv_error);
+    archive(v.fiv_error, v.no_interreflection_error);
     archive(v.layers, v.technique, v.mean_samples, v.stopped_by_time, v.ratio_error);
     archive(v.table_bytes, v.table_seconds, v.table_processor_seconds, v.findings);
 }
@@ -163,7 +163,7 @@ void parts(auto& archive, PartsOf<PathOptions> auto& v)
 }
 void parts(auto& archive, PartsOf<InterreflectionOptions> auto& v)
 {
-    archive(v.rounds, v.samples_per_cell, v.seed, v.path);
+    archive(v.enabled, v.rounds, v.samples_per_cell, v.seed, v.path);
 }
 void parts(auto& archive, PartsOf<IrradianceFilterOptions> auto& v)
 {
@@ -177,8 +177,7 @@ void parts(auto& archive, PartsOf<AtlasOptions> auto& v)
 void parts(auto& archive, PartsOf<FivOptions> auto& v)
 {
     archive(v.atlas, v.object_face_size, v.receiver_node_spacing_m, v.object_node_spacing_m);
-    archive(v.bias_texels, v.interpolation_tolerance, v.interreflection, v.light);
-    archive(v.object_samples);
+    archive(v.bias_texels, v.interpolation_tolerance, v.light, v.object_samples);
 }
 void parts(auto& archive, PartsOf<InsertionOptions> auto& v)
 {
@@ -190,8 +189,8 @@ static_assert(sizeof(ChannelNoise) == 32 && sizeof(NoiseModel) == 96);
 static_assert(sizeof(AlignmentOptions) == 32 && sizeof(DeghostOptions) == 24);
 static_assert(sizeof(CaptureOptions) == 208);
 static_assert(sizeof(RoomLightOptions) == 80 && sizeof(PathOptions) == 8);
-static_assert(sizeof(InterreflectionOptions) == 24 && sizeof(IrradianceFilterOptions) == 16);
-static_assert(sizeof(AtlasOptions) == 12 && sizeof(FivOptions) == 104);
+static_assert(sizeof(InterreflectionOptions) == 32 && sizeof(IrradianceFilterOptions) == 16);
+static_assert(sizeof(AtlasOptions) == 12 && sizeof(FivOptions) == 96);
 static_assert(sizeof(InsertionOptions) == 192);
 
 }  // namespace insitu

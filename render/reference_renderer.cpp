@@ -100,7 +100,7 @@ public:
         ++sums.count;
         if (point) {
             const glm::dvec3 radiance(
-                tracePath(scene_.objects(), scene_, *point, -direction, options_.path, random));
+                scene_.sampleObject(*point, -direction, options_.path, random));
             const double value = luminance(Rgb(radiance));
             sums.object += radiance;
             sums.object_square += value * value;

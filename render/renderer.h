@@ -48,8 +48,6 @@ struct FivOptions {
     float bias_texels = 1.5f;
     /// Between pixels, with/without is interpolated where that is off by less than this, >= 0.
     double interpolation_tolerance = 0.002;
-    /// Light that goes from the objects to each other and the room and back.
-    bool interreflection = true;
     FivLight light = FivLight::Room;
     /// Points on the objects that tell what these send, > 0.
     int object_samples = 512;
@@ -82,7 +80,7 @@ struct InsertionOptions {
 
 /// Error of a picture against the reference at random pixels that the objects change: of object
 /// radiance relative to its mean, and of the receivers' with/without. The reference's own noise is
-/// taken off.
+/// taken off; its inter-reflection is always counted.
 struct SampledError {
     int pixels = 0;      ///< 0: was not sampled
     double rms = 0.0;    ///< root mean square
@@ -93,6 +91,8 @@ struct InsertionResult {
     RenderLayers layers;
     Technique technique = Technique::Reference;  ///< that made the layers; never Auto
     SampledError fiv_error;                      ///< Auto: what it decided by
+    /// Without inter-reflection: how far this picture is from the reference with it.
+    SampledError no_interreflection_error;
     /// Samples per pixel; with Fiv the share of receivers that was computed, not interpolated.
     double mean_samples = 0.0;
     bool stopped_by_time = false;

@@ -39,14 +39,18 @@ RoomWithObjects::RoomWithObjects(const RoomLight& room,
                                  const ObjectScene& objects,
                                  const InterreflectionOptions& options,
                                  Progress& progress)
-    : room_(room), objects_(objects), change_(room.cellIrradiance())
+    : room_(room),
+      objects_(objects),
+      interreflection_(options.enabled),
+      change_(room.cellIrradiance())
 {
     for (const BoundingBox& box : objects.bounds())
         spheres_.push_back({0.5 * (box.min + box.max), 0.5 * glm::length(box.max - box.min)});
     for (std::size_t i = 0; i < change_.size(); ++i)
         change_[i] = Rgb(0.0f);
 
-    for (int round = 0; round < options.rounds; ++round) {
+    const int rounds = options.enabled ? options.rounds : 0;
+    for (int round = 0; round < rounds; ++round) {
         FaceGrid<Rgb> next = change_;
         parallelFor(0, static_cast<std::int64_t>(change_.size()), [&](std::int64_t number) {
             const std::size_t cell = static_cast<std::size_t>(number);
@@ -67,7 +71,7 @@ RoomWithObjects::RoomWithObjects(const RoomLight& room,
                          Rgb(sum / (static_cast<double>(options.samples_per_cell) * pi));
         });
         change_ = std::move(next);
-        progress.report("inter-reflection", (round + 1.0) / options.rounds);
+        progress.report("inter-reflection", (round + 1.0) / rounds);
         progress.checkpoint();
     }
 }
@@ -128,9 +132,13 @@ void RoomWithObjects::addDirection(glm::dvec3 x,
 
     const glm::dvec3 origin = offsetOrigin(x, normal, direction);
     const auto point = objects_.intersect(origin, direction, arrival.light.distance_m);
-    const glm::dvec3 with =
-        point ? glm::dvec3(tracePath(objects_, *this, *point, -direction, path, random))
-              : without + glm::dvec3(change(arrival));
+    glm::dvec3 with = without;
+    if (!point)
+        with += glm::dvec3(change(arrival));
+    else if (interreflection_)
+        with = glm::dvec3(tracePath(objects_, *this, *point, -direction, path, random));
+    else
+        with = glm::dvec3(point->material.emissive);
     sum.with += weight * with;
 }
 
@@ -158,6 +166,15 @@ ReceiverSample RoomWithObjects::sampleReceiver(glm::dvec3 x,
             addDirection(x, normal, by_cone, room_.arrive(x, by_cone), cones, path, random, sum);
     }
     return sum;
+}
+
+Rgb RoomWithObjects::sampleObject(const SurfacePoint& point,
+                                  glm::dvec3 wo,
+                                  PathOptions path,
+                                  RandomStream& random) const
+{
+    if (!interreflection_) path.max_bounces = 1;
+    return tracePath(objects_, *this, point, wo, path, random);
 }
 
 }  // namespace insitu

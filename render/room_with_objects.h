@@ -9,7 +9,10 @@
 
 namespace insitu {
 
+/// Light that goes from the objects to each other and the room and back.
 struct InterreflectionOptions {
+    /// false: of the objects only what they emit lights anything, and the room does not answer.
+    bool enabled = true;
     /// Times the light travels object -> room -> room. 0: the room does not answer. >= 0.
     int rounds = 2;
     /// Samples per cell and round, > 0.
@@ -47,6 +50,11 @@ public:
                                                 glm::dvec3 normal,
                                                 const PathOptions& path,
                                                 RandomStream& random) const;
+    /// One sample of the radiance of an object's point towards `wo` (unit), as the camera sees it.
+    [[nodiscard]] Rgb sampleObject(const SurfacePoint& point,
+                                   glm::dvec3 wo,
+                                   PathOptions path,
+                                   RandomStream& random) const;
 
     [[nodiscard]] const RoomLight& room() const { return room_; }
     [[nodiscard]] const ObjectScene& objects() const { return objects_; }
@@ -70,6 +78,7 @@ private:
 
     const RoomLight& room_;
     const ObjectScene& objects_;
+    bool interreflection_ = true;
     std::vector<Sphere> spheres_;
     FaceGrid<Rgb> change_;  ///< ΔL of the cells
 };

@@ -89,6 +89,7 @@ SampledError sampleError(const Camera& camera,
         pixels.emplace_back(at % camera.width, at / camera.width);
     }
     InsertionOptions sampling = options;
+    sampling.interreflection.enabled = true;
     sampling.interreflection.rounds = std::min(options.interreflection.rounds, 1);
     sampling.interreflection.samples_per_cell =
         std::min(options.interreflection.samples_per_cell, kSamplesPerCell);

@@ -161,6 +161,10 @@ void registerInsert(CLI::App& app, Context& context)
             "--max-seconds", render.max_seconds, "Stop rendering after this time; 0: no limit")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
+    command->add_flag("!--no-interreflection",
+                      render.interreflection.enabled,
+                      "Leave out the light that objects and room send each other; the report says "
+                      "what that costs");
     command
         ->add_option("--composite",
                      arguments->form,

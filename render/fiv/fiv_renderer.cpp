@@ -83,6 +83,7 @@ FivScene makeScene(const RoomLight& room,
                    const ObjectScene& objects,
                    const MergedObjects& all,
                    const FivOptions& fiv,
+                   bool interreflection,
                    InsertionResult& result,
                    Progress& progress)
 {
@@ -103,7 +104,8 @@ FivScene makeScene(const RoomLight& room,
                    room.cellIrradiance(),
                    {},
                    {},
-                   {}};
+                   {},
+                   interreflection};
     result.table_seconds = secondsSince(start);
     result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
     scene.cells = std::make_shared<CellGeometry>(scene.atlas.cells());
@@ -116,7 +118,8 @@ FivScene makeScene(const RoomLight& room,
 }
 
 /// What the objects send to each other and to the room, and what the room sends back: the objects'
-/// mean radiance, twice, then the room's change, then the objects again in the changed room.
+/// mean radiance, twice, then the room's change, then the objects again in the changed room. Or
+/// only what they emit.
 void lightEachOther(FivScene& scene,
                     ObjectShading& shading,
                     ReceiverLight& receivers,
@@ -130,7 +133,9 @@ void lightEachOther(FivScene& scene,
         places.back().normal = sample.point.geometric_normal;
     }
     scene.sent = SentLight(scene.objects, samples);
-    for (int round = 0; round < 3; ++round) {
+    if (!scene.interreflection)
+        setGlow(scene, samples, std::vector<ObjectShading::Received>(places.size()));
+    for (int round = 0; scene.interreflection && round < 3; ++round) {
         if (round == 2) scene.room_change = roomChange(scene, receivers);
         if (round > 0) shading.update(/*room_too=*/round == 2);
         setGlow(scene, samples, shading.receive(places));
@@ -172,10 +177,11 @@ InsertionResult renderFiv(const Camera& camera,
         return result;
     }
     const FivOptions& fiv = options.fiv;
-    FivScene scene = makeScene(room, objects, all, fiv, result, progress);
+    FivScene scene =
+        makeScene(room, objects, all, fiv, options.interreflection.enabled, result, progress);
     ObjectShading shading(scene, {fiv.object_node_spacing_m, fiv.bias_texels});
     ReceiverLight light(scene, fiv.receiver_node_spacing_m);
-    if (fiv.interreflection) lightEachOther(scene, shading, light, fiv, progress);
+    lightEachOther(scene, shading, light, fiv, progress);
     progress.report("fiv", 0.3);
 
     const auto receivers = renderObjectPixels(camera, scene, shading, result.layers, progress);

@@ -31,6 +31,7 @@ struct FivScene {
     std::vector<Rgb> glow;
     ObjectGlow near;  ///< what of that is different close to the objects
     SentLight sent;   ///< and what they show themselves and each other
+    bool interreflection = true;
 
     [[nodiscard]] const LocalFrame& frame() const { return coarse.silhouettes.local; }
     [[nodiscard]] Rgb glowAlong(glm::dvec3 direction) const

@@ -27,6 +27,12 @@ Rgb reflectanceOf(const GlossyLobe& lobe, double cosine)
                          static_cast<float>(albedo.at_f90));
 }
 
+/// Reflections of objects in objects that are followed.
+int bouncesIn(const FivScene& scene)
+{
+    return scene.interreflection ? 1 : 0;
+}
+
 Rgb arriving(const FivScene& scene,
              const SurfacePoint& point,
              glm::dvec3 direction,
@@ -92,7 +98,7 @@ Rgb meanOfLobe(const FivScene& scene,
         // What lies below the surface itself, by its own curvature, is not lit.
         if (!drawn || glm::dot(drawn->direction, point.geometric_normal) <= 0.0) continue;
         sum += drawn->weight.g *
-               arriving(scene, point, drawn->direction, /*with_spots=*/false, /*bounces=*/1);
+               arriving(scene, point, drawn->direction, /*with_spots=*/false, bouncesIn(scene));
         weights += drawn->weight.g;
     }
     return weights > 0.0f ? sum / weights : Rgb(0.0f);
@@ -153,7 +159,7 @@ Gloss glossyRadiance(const FivScene& scene,
                                              point,
                                              glm::reflect(-wo, normal),
                                              /*with_spots=*/true,
-                                             /*bounces=*/1);
+                                             bouncesIn(scene));
         return gloss;
     }
     const float share = std::min(luminance(reflectance), 1.0f);

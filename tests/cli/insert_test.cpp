@@ -239,6 +239,20 @@ TEST_F(InsertProject, OneExposureIsToldAndTheTechniqueTaken)
     EXPECT_EQ(render["technique_asked"], "auto");
     EXPECT_EQ(render["technique"], "fiv");
     EXPECT_GT(render["fiv_error"]["pixels"].get<int>(), 0);
+    EXPECT_TRUE(render["interreflection"].get<bool>());
+    EXPECT_TRUE(render["no_interreflection_error"].is_null());
+}
+
+TEST_F(InsertProject, WhatNoInterreflectionCostsIsTold)
+{
+    const fs::path report = folder_ / "report.json";
+    const ProgramRun run =
+        insert({"--technique", "fiv", "--no-interreflection", "--report", report.string()});
+    EXPECT_EQ(run.exit_code, 0) << run.messages;
+    EXPECT_THAT(run.messages, HasSubstr("no-interreflection"));
+    const Json render = readJsonFile(report)["render"];
+    EXPECT_FALSE(render["interreflection"].get<bool>());
+    EXPECT_GT(render["no_interreflection_error"]["rms"].get<double>(), 0.0);
 }
 
 TEST_F(InsertProject, WrongUsage)

@@ -39,7 +39,7 @@ TEST(FivCreases, ASlotThinnerThanATexelIsDark)
     options.fiv.atlas = {16, 48, 2};
     options.fiv.object_face_size = 8;
     options.fiv.receiver_node_spacing_m = 1.0;
-    options.fiv.interreflection = false;
+    options.interreflection.enabled = false;
     // 2 mm a pixel.
     const Camera camera = Camera::lookAt({0.0, 2.6, 1e-4}, {0.0, 0.62, 0.0}, 1000.0, 64, 32);
     const RenderLayers layers =

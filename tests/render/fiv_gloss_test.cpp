@@ -57,7 +57,7 @@ protected:
 TEST_P(GlossyObjects, ReflectAnEvenLightAsTheClosedFormSays)
 {
     InsertionOptions options = fiv();
-    options.fiv.interreflection = false;
+    options.interreflection.enabled = false;
     RoomDescription room;
     room.floors.push_back({});
     const Material material = metal(GetParam());

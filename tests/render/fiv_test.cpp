@@ -89,7 +89,7 @@ TEST(RenderFiv, BlackBallsOverTheFloorCastTheClosedFormShadow)
     const RoomLight light = lightOf(proxy, uniform(1.0f));
     const Camera camera = above();
     InsertionOptions options = fiv();
-    options.fiv.interreflection = false;
+    options.interreflection.enabled = false;
     for (const std::vector<Ball>& scene :
          {std::vector<Ball>{{{0, 1.0f, 0}, 0.5f}},
           std::vector<Ball>{{{-0.9f, 0.8f, 0}, 0.4f}, {{0.9f, 0.8f, 0}, 0.4f}},
@@ -152,7 +152,7 @@ TEST(RenderFiv, AConcentratedLightCastsItsOwnShadow)
 
     const ObjectScene ball = balls({{{0, 1.0f, 0}, 0.3f}}, 0.0f);
     InsertionOptions options = fiv();
-    options.fiv.interreflection = false;
+    options.interreflection.enabled = false;
     const Camera camera = Camera::lookAt({-1.2, 4.0, 0.3}, {-1.19, 0.0, 0.2}, 40.0, 48, 48);
     const RenderLayers layers = renderInsertion(camera, light, ball, options, g_silent).layers;
     int dark = 0;
@@ -284,7 +284,7 @@ TEST(RenderFiv, FurnitureHidesObjectsFromReceivers)
     const Camera camera = Camera::lookAt({-1.0, 1.0, 0.0}, {-2.0, 0.8, 0.0}, 70.0, 24, 18);
     InsertionOptions options = fiv();
     // The room's cells are coarser than the partition is thick.
-    options.fiv.interreflection = false;
+    options.interreflection.enabled = false;
     const RenderLayers layers = renderInsertion(camera, light, ball, options, g_silent).layers;
     EXPECT_EQ(layers.irradiance_with, layers.irradiance_without);
     EXPECT_GT(layers.irradiance_without(12, 9).g, 0.1f);
