@@ -31,8 +31,7 @@ public:
             count += static_cast<std::size_t>(blocks_.back().columns) *
                      static_cast<std::size_t>(blocks_.back().rows);
         }
-        values_.resize(count);
-        valid_.assign(count, 0);
+        texels_.resize(count);
     }
 
     struct Texel {
@@ -40,7 +39,7 @@ public:
         int column = 0;
         int row = 0;
     };
-    [[nodiscard]] std::size_t size() const { return values_.size(); }
+    [[nodiscard]] std::size_t size() const { return texels_.size(); }
     [[nodiscard]] std::size_t faceCount() const { return blocks_.size(); }
     [[nodiscard]] int columns(std::size_t face) const { return blocks_[face].columns; }
     [[nodiscard]] int rows(std::size_t face) const { return blocks_[face].rows; }
@@ -54,10 +53,10 @@ public:
         return std::views::iota(b.first, b.first + count);
     }
 
-    [[nodiscard]] Value& operator[](std::size_t texel) { return values_[texel]; }
-    [[nodiscard]] const Value& operator[](std::size_t texel) const { return values_[texel]; }
-    [[nodiscard]] bool valid(std::size_t texel) const { return valid_[texel] != 0; }
-    void setValid(std::size_t texel, bool valid) { valid_[texel] = valid ? 1 : 0; }
+    [[nodiscard]] Value& operator[](std::size_t texel) { return texels_[texel].value; }
+    [[nodiscard]] const Value& operator[](std::size_t texel) const { return texels_[texel].value; }
+    [[nodiscard]] bool valid(std::size_t texel) const { return texels_[texel].valid; }
+    void setValid(std::size_t texel, bool valid) { texels_[texel].valid = valid; }
 
     [[nodiscard]] std::size_t texelAt(std::size_t face, glm::dvec2 uv) const
     {
@@ -105,10 +104,10 @@ public:
             for (int dx = 0; dx < 2; ++dx) {
                 const float weight = (dx ? tx : 1.0f - tx) * (dy ? ty : 1.0f - ty);
                 if (weight <= 0.0f) continue;
-                const std::size_t i =
-                    index(b, std::min(x0 + dx, b.columns - 1), std::min(y0 + dy, b.rows - 1));
-                if (!valid_[i]) continue;
-                sum += values_[i] * weight;
+                const Stored& texel = texels_[index(
+                    b, std::min(x0 + dx, b.columns - 1), std::min(y0 + dy, b.rows - 1))];
+                if (!texel.valid) continue;
+                sum += texel.value * weight;
                 weight_sum += weight;
             }
         }
@@ -127,9 +126,13 @@ private:
                static_cast<std::size_t>(column);
     }
 
+    /// Side by side: look-ups wait for memory, more than for anything else.
+    struct Stored {
+        Value value{};
+        bool valid = false;
+    };
     std::vector<Block> blocks_;
-    std::vector<Value> values_;
-    std::vector<std::uint8_t> valid_;
+    std::vector<Stored> texels_;
 };
 
 }  // namespace insitu

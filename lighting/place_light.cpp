@@ -63,7 +63,7 @@ PlaceLight lookAround(const RoomLight& room,
             const RoomLight::Arrival arrival = room.arrive(place, direction);
             ++looked;
             if (!spots.holds(arrival, direction))
-                light.radiance[cell] += arrival.light.radiance / static_cast<float>(rays);
+                light.radiance[cell] += arrival.radiance / static_cast<float>(rays);
             light.ends[cell] = endOf(arrival);
             if (light.ends[cell].face == PlaceLight::End::kNoFace) continue;
             if (!faces[arrival.hit->face].two_sided &&

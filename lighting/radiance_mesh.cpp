@@ -144,8 +144,7 @@ std::vector<Mean> projectOutwards(const RoomLight& room,
             at.any = arrival.hit.has_value();
             if (!at.any) return;
             at.slot = grid.slot(arrival.hit->face, arrival.hit->uv);
-            at.radiance =
-                isClipped(probe, direction) ? arrival.light.radiance : lookUp(probe, direction);
+            at.radiance = isClipped(probe, direction) ? arrival.radiance : lookUp(probe, direction);
             at.opening = arrival.hit->opening;
         });
         // Summed in one order, whatever the threads did.

@@ -72,7 +72,6 @@ RoomLight::RoomLight(const SceneProxy& proxy,
       radiance_(proxy, std::max(options.texel_m, std::sqrt(totalArea(proxy) / kMaxTexels))),
       probe_saw_(radiance_.size(), 0),
       photo_saw_(radiance_.size(), 0),
-      gap_(radiance_.size(), 0),
       clipped_(radiance_),
       cell_irradiance_(proxy,
                        std::max(options.cell_m, std::sqrt(totalArea(proxy) / (kMaxTexels / 64.0)))),
@@ -209,7 +208,7 @@ double RoomLight::outsidePdf(glm::dvec3 direction) const
 std::optional<ProxyHit> RoomLight::intersect(glm::dvec3 x, glm::dvec3 direction) const
 {
     auto hit = proxy_.intersect(x, direction);
-    while (hit && gap_[radiance_.texelAt(hit->face, hit->uv)]) {
+    while (hit && !gap_.empty() && gap_[radiance_.texelAt(hit->face, hit->uv)]) {
         const double passed = hit->distance_m;
         hit = proxy_.intersect(hit->point, direction);
         if (hit) hit->distance_m += passed;
@@ -221,39 +220,44 @@ RoomLight::Arrival RoomLight::arrive(glm::dvec3 x, glm::dvec3 direction) const
 {
     Arrival arrival;
     arrival.hit = intersect(x, direction);
-    const auto& hit = arrival.hit;
-    if (hit && !hit->opening) {
-        const double cosine = std::abs(glm::dot(hit->normal, direction));
-        arrival.light.radiance = faceRadiance(hit->face, hit->uv);
-        arrival.clipped = clipped_.lookUp(hit->face, hit->uv, Rgb(0.0f));
-        arrival.light.distance_m = hit->distance_m;
-        arrival.light.pdf = texelPdf(hit->face, hit->uv) * hit->distance_m * hit->distance_m /
-                            std::max(cosine, 1e-9);
-        return arrival;
-    }
-    arrival.light.radiance = lookUp(outside_, direction);
-    arrival.clipped = lookUpClipped(outside_, direction);
-    arrival.light.pdf = outsidePdf(direction);
-    if (hit) {
-        const double cosine = std::abs(glm::dot(hit->normal, direction));
-        arrival.light.distance_m = hit->distance_m;
-        arrival.light.pdf += portal_share_ / portal_cumulative_area_.back() * hit->distance_m *
-                             hit->distance_m / std::max(cosine, 1e-9);
-    }
+    if (arrival.hit) arrival.distance_m = arrival.hit->distance_m;
+    arrival.radiance = arrival.hit && !arrival.hit->opening
+                           ? faceRadiance(arrival.hit->face, arrival.hit->uv)
+                           : lookUp(outside_, direction);
     return arrival;
+}
+
+double RoomLight::pdf(const Arrival& arrival, glm::dvec3 direction) const
+{
+    if (!arrival.hit) return outsidePdf(direction);
+    const ProxyHit& hit = *arrival.hit;
+    const double cosine = std::abs(glm::dot(hit.normal, direction));
+    const double per_area = hit.distance_m * hit.distance_m / std::max(cosine, 1e-9);
+    return hit.opening
+               ? outsidePdf(direction) + portal_share_ / portal_cumulative_area_.back() * per_area
+               : texelPdf(hit.face, hit.uv) * per_area;
+}
+
+Rgb RoomLight::clippedOf(const Arrival& arrival, glm::dvec3 direction) const
+{
+    if (clipped_sources_.empty()) return Rgb(0.0f);
+    return arrival.hit && !arrival.hit->opening
+               ? clipped_.lookUp(arrival.hit->face, arrival.hit->uv, Rgb(0.0f))
+               : lookUpClipped(outside_, direction);
 }
 
 IncidentLight RoomLight::incident(glm::dvec3 x, glm::dvec3 direction) const
 {
-    return arrive(x, direction).light;
+    const Arrival arrival = arrive(x, direction);
+    return {arrival.radiance, arrival.distance_m, pdf(arrival, direction)};
 }
 
 std::optional<LightSample> RoomLight::sample(glm::dvec3 x, double selector, glm::vec2 u) const
 {
     const auto drawn = draw(x, selector, u);
     if (!drawn) return std::nullopt;
-    const IncidentLight& light = drawn->arrival.light;
-    return LightSample{drawn->direction, light.distance_m, light.radiance, light.pdf};
+    return LightSample{
+        drawn->direction, drawn->arrival.distance_m, drawn->arrival.radiance, drawn->pdf};
 }
 
 std::optional<RoomLight::DrawnArrival> RoomLight::draw(glm::dvec3 x,
@@ -291,14 +295,16 @@ std::optional<RoomLight::DrawnArrival> RoomLight::draw(glm::dvec3 x,
     const glm::dvec3 way = far ? target : target - x;
     const double length = glm::length(way);
     if (!(length > 1e-9)) return std::nullopt;
-    const Arrival arrival = arrive(x, way / length);
+    const glm::dvec3 direction = way / length;
+    const Arrival arrival = arrive(x, direction);
     const bool sees_surface = arrival.hit && !arrival.hit->opening;
     if (sees_surface != on_surface) return std::nullopt;
     if (on_surface && (arrival.hit->face != wanted_face ||
                        std::abs(arrival.hit->distance_m - length) > 1e-6 * (1.0 + length)))
         return std::nullopt;
-    if (!(arrival.light.pdf > 0.0)) return std::nullopt;
-    return DrawnArrival{way / length, arrival};
+    const double density = pdf(arrival, direction);
+    if (!(density > 0.0)) return std::nullopt;
+    return DrawnArrival{direction, arrival, density};
 }
 
 }  // namespace insitu

@@ -80,17 +80,20 @@ public:
                                                     glm::vec2 u) const override;
     [[nodiscard]] IncidentLight incident(glm::dvec3 x, glm::dvec3 direction) const override;
 
-    /// The same as incident(), with what was hit (nothing: far away).
+    /// What arrives at a place along a direction that points away from it, and from where.
     struct Arrival {
-        IncidentLight light;
-        Rgb clipped{0.0f};  ///< part of the radiance that comes from lights clipped in the probe
-        std::optional<ProxyHit> hit;
+        Rgb radiance{0.0f};
+        double distance_m = kInfinity;
+        std::optional<ProxyHit> hit;  ///< nothing: far away
     };
     [[nodiscard]] Arrival arrive(glm::dvec3 x, glm::dvec3 direction) const;
+    /// Density with which draw() would have drawn the direction of this arrival.
+    [[nodiscard]] double pdf(const Arrival& arrival, glm::dvec3 direction) const;
     /// The same as sample(), with what was hit.
     struct DrawnArrival {
         glm::dvec3 direction{0.0};
         Arrival arrival;
+        double pdf = 0.0;
     };
     [[nodiscard]] std::optional<DrawnArrival> draw(glm::dvec3 x,
                                                    double selector,
@@ -145,6 +148,8 @@ private:
     void fillUnseen();
     void reportCoverage(glm::dvec3 reference);
     [[nodiscard]] Rgb faceRadiance(std::size_t face, glm::dvec2 uv) const;
+    /// Part of the radiance that comes from lights clipped in the probe.
+    [[nodiscard]] Rgb clippedOf(const Arrival& arrival, glm::dvec3 direction) const;
     [[nodiscard]] Rgb radianceBehind(const ProxyHit& solid, glm::dvec3 direction) const;
     [[nodiscard]] double texelArea(std::size_t face) const;
     [[nodiscard]] double texelPdf(std::size_t face, glm::dvec2 uv) const;
@@ -174,7 +179,7 @@ private:
     FaceGrid<Rgb> radiance_;               ///< every texel outside openings is valid when built
     std::vector<std::uint8_t> probe_saw_;  ///< per texel of radiance_
     std::vector<std::uint8_t> photo_saw_;
-    std::vector<std::uint8_t> gap_;  ///< per texel of radiance_: light passes
+    std::vector<std::uint8_t> gap_;  ///< per texel of radiance_: light passes; empty: nowhere
     FaceGrid<Rgb> clipped_;          ///< part of radiance_ that is only a lower bound
     FaceGrid<Rgb> cell_irradiance_;
     FaceGrid<Rgb> cell_reflectance_;

@@ -32,6 +32,7 @@ std::uint8_t bandOf(glm::vec3 direction, glm::vec3 nearest)
 void RoomLight::findGaps(const EnvironmentMap& probe, glm::dvec3 center)
 {
     if (proxy_.openings().empty()) return;
+    std::vector<std::uint8_t> gaps(radiance_.size(), 0);
     std::size_t count = 0;
     for (std::size_t face = 0; face < radiance_.faceCount(); ++face) {
         if (!proxy_.faces()[face].solid) continue;
@@ -48,16 +49,17 @@ void RoomLight::findGaps(const EnvironmentMap& probe, glm::dvec3 center)
             // Leave this box and whatever solid stands behind it: is there an opening?
             const auto beyond = intersectBehindBoxes(proxy_, point, direction);
             if (!beyond || !beyond->opening) continue;
-            gap_[i] = 1;
+            gaps[i] = 1;
             ++count;
         }
     }
-    if (count > 0)
-        findings_.push_back(
-            {Severity::Info,
-             "light-through-gaps",
-             "the probe saw the light of an opening through solid boxes, brighter than they could "
-             "reflect: there the boxes let light pass"});
+    if (count == 0) return;
+    gap_ = std::move(gaps);
+    findings_.push_back(
+        {Severity::Info,
+         "light-through-gaps",
+         "the probe saw the light of an opening through solid boxes, brighter than they could "
+         "reflect: there the boxes let light pass"});
 }
 
 void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progress& progress)
@@ -81,7 +83,8 @@ void RoomLight::bakeProbe(const EnvironmentMap& probe, glm::dvec3 center, Progre
                     const glm::dvec2 uv = radiance_.uv(texel, inside);
                     if (proxy_.faces()[face].triangle && uv.x + uv.y > 1.0) continue;
                     const glm::dvec3 point = proxy_.pointOn(face, uv);
-                    if (proxy_.insideOpening(face, point) || gap_[index]) continue;
+                    if (proxy_.insideOpening(face, point) || (!gap_.empty() && gap_[index]))
+                        continue;
                     ++solid;
                     const glm::dvec3 way = point - center;
                     const bool facing = proxy_.faces()[face].two_sided ||

@@ -100,17 +100,17 @@ glm::dvec3 RoomLight::irradianceOver(std::span<const glm::dvec3> places,
     // [Veach97, 9.2].
     glm::dvec3 sum(0.0);
     const glm::dmat3 frame = frameFromNormal(normal);
-    const auto add = [&](glm::dvec3 direction, const Arrival& arrival) {
+    const auto add = [&](glm::dvec3 direction, const Arrival& arrival, double density) {
         const double cosine = glm::dot(direction, normal);
         if (cosine <= 0.0) return;
-        const double weight = cosine / (cosine / pi + arrival.light.pdf) / options.rays_per_cell;
-        const glm::dvec3 radiance =
-            glm::dvec3(arrival.light.radiance) - glm::dvec3(arrival.clipped);
+        const double weight = cosine / (cosine / pi + density) / options.rays_per_cell;
+        const Rgb clipped = clippedOf(arrival, direction);
+        const glm::dvec3 radiance = glm::dvec3(arrival.radiance) - glm::dvec3(clipped);
         sum += radiance * weight;
         if (!arrival.hit || arrival.hit->opening) {
             const std::uint8_t band = outsideBand(direction);
             if (band != kMeasured) (*bands)[band] += radiance * weight;
-        } else if (proxy_.faces()[arrival.hit->face].solid && arrival.clipped == Rgb(0.0f)) {
+        } else if (proxy_.faces()[arrival.hit->face].solid && clipped == Rgb(0.0f)) {
             const glm::dvec3 change =
                 weight * (glm::dvec3(radianceBehind(*arrival.hit, direction)) - radiance);
             doubt->lower += glm::min(change, glm::dvec3(0.0));
@@ -125,10 +125,11 @@ glm::dvec3 RoomLight::irradianceOver(std::span<const glm::dvec3> places,
         if (s < strata * strata)
             u = (u + glm::vec2(s % strata, s / strata)) / static_cast<float>(strata);
         const glm::dvec3 direction = frame * cosineHemisphere(u);
-        add(direction, arrive(x, direction));
+        const Arrival arrival = arrive(x, direction);
+        add(direction, arrival, pdf(arrival, direction));
         const double selector = random.uniformDouble();
         if (const auto drawn = draw(x, selector, random.uniform2()))
-            add(drawn->direction, drawn->arrival);
+            add(drawn->direction, drawn->arrival, drawn->pdf);
     }
     // What is clipped by itself, systematically: it may become a thousand times as strong, and so
     // would its noise.

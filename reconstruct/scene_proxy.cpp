@@ -150,17 +150,16 @@ std::vector<ProxyFace> collectFaces(const RoomDescription& room)
     return faces;
 }
 
-/// Coordinates of a point in the face's own (not necessarily orthogonal) basis.
-glm::dvec2 faceUv(const ProxyFace& face, glm::dvec3 point)
+/// Columns: what a point relative to the face's corner is multiplied by for its coordinates in the
+/// face's own (not necessarily orthogonal) basis.
+glm::dmat2x3 uvAxes(const ProxyFace& face)
 {
-    const glm::dvec3 d = point - face.corner;
     const double uu = glm::dot(face.edge_u, face.edge_u);
     const double uv = glm::dot(face.edge_u, face.edge_v);
     const double vv = glm::dot(face.edge_v, face.edge_v);
-    const double du = glm::dot(d, face.edge_u);
-    const double dv = glm::dot(d, face.edge_v);
     const double determinant = uu * vv - uv * uv;
-    return {(vv * du - uv * dv) / determinant, (uu * dv - uv * du) / determinant};
+    return {(vv * face.edge_u - uv * face.edge_v) / determinant,
+            (uu * face.edge_v - uv * face.edge_u) / determinant};
 }
 
 glm::dvec3 polygonNormal(const std::vector<glm::dvec3>& corners)
@@ -188,7 +187,7 @@ SceneProxy::SceneProxy(const RoomDescription& room)
         ProxyFace* wall = nullptr;
         for (ProxyFace& face : faces_) {
             const double distance = std::abs(glm::dot(center - face.corner, face.normal));
-            const glm::dvec2 uv = faceUv(face, center);
+            const glm::dvec2 uv = (center - face.corner) * uvAxes(face);
             const bool inside = uv.x >= 0 && uv.y >= 0 && uv.x <= 1 && uv.y <= 1;
             if (std::abs(glm::dot(normal, face.normal)) < 0.95 || !inside || distance > nearest)
                 continue;
@@ -209,6 +208,7 @@ SceneProxy::SceneProxy(const RoomDescription& room)
     // Two triangles a parallelogram, one a triangle.
     for (std::size_t f = 0; f < faces_.size(); ++f) {
         const ProxyFace& face = faces_[f];
+        uv_axes_.push_back(uvAxes(face));
         const std::uint32_t first = static_cast<std::uint32_t>(mesh_.positions.size());
         for (const glm::dvec3& p : {face.corner,
                                     face.corner + face.edge_u,
@@ -246,7 +246,7 @@ std::optional<ProxyHit> SceneProxy::intersect(glm::dvec3 origin, glm::dvec3 dire
             result.distance_m = distance;
             result.face = index;
             result.point = origin + distance * direction;
-            result.uv = glm::clamp(faceUv(face, result.point), 0.0, 1.0);
+            result.uv = glm::clamp((result.point - face.corner) * uv_axes_[index], 0.0, 1.0);
             result.normal = facing < 0.0 ? face.normal : -face.normal;
             result.opening = insideOpening(index, result.point);
             return result;

@@ -96,6 +96,7 @@ public:
 
 private:
     std::vector<ProxyFace> faces_;
+    std::vector<glm::dmat2x3> uv_axes_;  ///< of each face: (u, v) of what is relative to its corner
     std::vector<RoomOpening> openings_;
     std::vector<std::size_t> face_of_triangle_;
     TriangleMesh mesh_;

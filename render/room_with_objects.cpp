@@ -86,19 +86,19 @@ std::optional<LightSample> RoomWithObjects::sample(glm::dvec3 x, double selector
 {
     const auto drawn = room_.draw(x, selector, u);
     if (!drawn) return std::nullopt;
-    const IncidentLight& light = drawn->arrival.light;
+    const RoomLight::Arrival& arrival = drawn->arrival;
     return LightSample{drawn->direction,
-                       light.distance_m,
-                       glm::max(light.radiance + change(drawn->arrival), Rgb(0.0f)),
-                       light.pdf};
+                       arrival.distance_m,
+                       glm::max(arrival.radiance + change(arrival), Rgb(0.0f)),
+                       drawn->pdf};
 }
 
 IncidentLight RoomWithObjects::incident(glm::dvec3 x, glm::dvec3 direction) const
 {
     const RoomLight::Arrival arrival = room_.arrive(x, direction);
-    IncidentLight light = arrival.light;
-    light.radiance = glm::max(light.radiance + change(arrival), Rgb(0.0f));
-    return light;
+    return {glm::max(arrival.radiance + change(arrival), Rgb(0.0f)),
+            arrival.distance_m,
+            room_.pdf(arrival, direction)};
 }
 
 RoomWithObjects::Cones RoomWithObjects::conesFrom(glm::dvec3 x) const
@@ -118,6 +118,7 @@ void RoomWithObjects::addDirection(glm::dvec3 x,
                                    glm::dvec3 normal,
                                    glm::dvec3 direction,
                                    const RoomLight::Arrival& arrival,
+                                   double light_pdf,
                                    const Cones& cones,
                                    const PathOptions& path,
                                    RandomStream& random,
@@ -126,12 +127,12 @@ void RoomWithObjects::addDirection(glm::dvec3 x,
     const double cosine = glm::dot(direction, normal);
     if (cosine <= 0.0) return;
     // Balance heuristic over the three strategies, one draw each.
-    const double weight = cosine / (cosine / pi + arrival.light.pdf + cones.pdf(direction));
-    const glm::dvec3 without(arrival.light.radiance);
+    const double weight = cosine / (cosine / pi + light_pdf + cones.pdf(direction));
+    const glm::dvec3 without(arrival.radiance);
     sum.without += weight * without;
 
     const glm::dvec3 origin = offsetOrigin(x, normal, direction);
-    const auto point = objects_.intersect(origin, direction, arrival.light.distance_m);
+    const auto point = objects_.intersect(origin, direction, arrival.distance_m);
     glm::dvec3 with = without;
     if (!point)
         with += glm::dvec3(change(arrival));
@@ -151,19 +152,24 @@ ReceiverSample RoomWithObjects::sampleReceiver(glm::dvec3 x,
     const Cones cones = conesFrom(x);
 
     const glm::dvec3 by_cosine = frameFromNormal(normal) * cosineHemisphere(random.uniform2());
-    addDirection(x, normal, by_cosine, room_.arrive(x, by_cosine), cones, path, random, sum);
+    const auto add = [&](glm::dvec3 direction) {
+        const RoomLight::Arrival arrival = room_.arrive(x, direction);
+        const double density = room_.pdf(arrival, direction);
+        addDirection(x, normal, direction, arrival, density, cones, path, random, sum);
+    };
+    add(by_cosine);
 
     const double selector = random.uniformDouble();
     if (const auto drawn = room_.draw(x, selector, random.uniform2()))
-        addDirection(x, normal, drawn->direction, drawn->arrival, cones, path, random, sum);
+        addDirection(
+            x, normal, drawn->direction, drawn->arrival, drawn->pdf, cones, path, random, sum);
 
     if (cones.count > 0) {
         const Cones::Cone& cone =
             cones.cones[random.below(static_cast<std::uint32_t>(cones.count))];
         const glm::dvec3 by_cone =
             frameFromNormal(cone.axis) * uniformCone(random.uniform2(), cone.cos_half_angle);
-        if (glm::dot(by_cone, normal) > 0.0)
-            addDirection(x, normal, by_cone, room_.arrive(x, by_cone), cones, path, random, sum);
+        if (glm::dot(by_cone, normal) > 0.0) add(by_cone);
     }
     return sum;
 }

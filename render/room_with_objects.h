@@ -71,6 +71,7 @@ private:
                       glm::dvec3 normal,
                       glm::dvec3 direction,
                       const RoomLight::Arrival& arrival,
+                      double light_pdf,
                       const Cones& cones,
                       const PathOptions& path,
                       RandomStream& random,

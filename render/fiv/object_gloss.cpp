@@ -68,11 +68,11 @@ Rgb arriving(const FivScene& scene,
     const RoomLight::Arrival arrival =
         scene.room.arrive(scene.light == FivLight::Room ? start : scene.frame().center, direction);
     if (scene.light != FivLight::Cube) {
-        const auto met = scene.objects.intersect(start, direction, arrival.light.distance_m);
+        const auto met = scene.objects.intersect(start, direction, arrival.distance_m);
         if (met) return sentBy(scene, *met, direction, bounces);
     }
     Rgb radiance =
-        with_spots || !scene.spots.holds(arrival, direction) ? arrival.light.radiance : Rgb(0.0f);
+        with_spots || !scene.spots.holds(arrival, direction) ? arrival.radiance : Rgb(0.0f);
     if (arrival.hit && !arrival.hit->opening)
         radiance += scene.room_change.lookUp(arrival.hit->face, arrival.hit->uv, Rgb(0.0f));
     return glm::max(radiance, Rgb(0.0f));

@@ -234,7 +234,8 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
     if (scene_.light != FivLight::Cube)
         hiddenIrradiance(scene_.coarse, hideable_, local, normals, lost, options_.bias_texels);
     std::vector<Received> result(places.size());
-    for (std::size_t i = 0; i < places.size(); ++i) {
+    parallelFor(0, static_cast<std::int64_t>(places.size()), [&](std::int64_t number) {
+        const auto i = static_cast<std::size_t>(number);
         const Rgb all = mean_irradiance_.lookUp(places[i].normal);
         const Rgb left = glm::max(all - lost[i].light, Rgb(0.0f));
         const Rgb open = openIrradiance(places[i]);
@@ -249,7 +250,7 @@ std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Plac
                        hidden * std::max(kPi - lost[i].sky, 0.0f) * around.sent_nearby;
         }
         if (!scene_.spots.spots().empty()) r.spots = spotIrradiance(places[i]);
-    }
+    });
     return result;
 }
 

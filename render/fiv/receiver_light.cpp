@@ -104,11 +104,9 @@ void ReceiverLight::lookTowardObjects(Node& node, int rays_along) const
             const glm::dvec3 toward = cells.cells.directionOfRay(cell, ray, rays_along);
             const RoomLight::Arrival arrival = scene_.room.arrive(node.position, toward);
             // Furniture of the room that stands before the objects hides them.
-            if (arrival.light.distance_m < scene_.distanceToObjects(node.position, toward))
-                continue;
+            if (arrival.distance_m < scene_.distanceToObjects(node.position, toward)) continue;
             look.beyond += share;
-            if (!scene_.spots.holds(arrival, toward))
-                look.radiance += share * arrival.light.radiance;
+            if (!scene_.spots.holds(arrival, toward)) look.radiance += share * arrival.radiance;
             look.end = endOf(arrival);
         }
         if (look.beyond > 0.0f) node.looks.push_back(look);

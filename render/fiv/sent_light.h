@@ -1,9 +1,12 @@
 #pragma once
 
-#include "core/image.h"
+#include "core/color.h"
+#include "core/instruction_set.h"
 
 #include <glm/glm.hpp>
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -26,12 +29,23 @@ public:
     /// before update().
     [[nodiscard]] Rgb at(glm::dvec3 place, glm::dvec3 unit_normal) const;
 
+    /// The same by one of the processor's instruction sets, with the same bytes.
+    [[nodiscard]] Rgb at(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const;
+
 private:
-    struct Sample {
-        glm::vec3 position{0.0f}, normal{0.0f};
-        Rgb sent{0.0f};
+    static constexpr std::size_t kLanes = 16;
+    using Lanes = std::array<float, kLanes>;
+    /// As many samples as are worked on at a time; unused ones have no normal and weigh nothing.
+    struct Bundle {
+        Lanes x{}, y{}, z{}, normal_x{}, normal_y{}, normal_z{}, red{}, green{}, blue{};
     };
-    std::vector<Sample> samples_;
+    /// Weight, red, green and blue.
+    using Sums = std::array<Lanes, 4>;
+    void sum(glm::vec3 x, glm::vec3 n, Sums& sums) const;
+    void sumAvx2(glm::vec3 x, glm::vec3 n, Sums& sums) const;
+    void sumAvx512(glm::vec3 x, glm::vec3 n, Sums& sums) const;
+
+    std::vector<Bundle> bundles_;
     std::vector<float> open_;
     float spacing2_ = 0.0f;  ///< square of the distance between samples
 };

@@ -101,13 +101,13 @@ TEST(RoomLight, WhatIsSeenThroughAnOpeningStaysAtInfinity)
     for (const glm::dvec3& x : {glm::dvec3(0, 1.4, 0), glm::dvec3(1, 1.5, -0.5)}) {
         const RoomLight::Arrival arrival = light.arrive(x, d);
         ASSERT_TRUE(arrival.hit && arrival.hit->opening);
-        EXPECT_NEAR(arrival.light.radiance.r, expected, 0.05f);
+        EXPECT_NEAR(arrival.radiance.r, expected, 0.05f);
     }
     // A direction the probe did not see through the window takes the nearest one that it did.
     const glm::dvec3 steep = glm::normalize(glm::dvec3(0.5, 0.6, 0.0));
     const RoomLight::Arrival extended = light.arrive({1.6, 1.1, 0.0}, steep);
     ASSERT_TRUE(extended.hit && extended.hit->opening);
-    EXPECT_NEAR(extended.light.radiance.r, 10.0f, 0.2f);
+    EXPECT_NEAR(extended.radiance.r, 10.0f, 0.2f);
 }
 
 TEST(RoomLight, ReprojectedLightKeepsTheProbesIrradiance)
