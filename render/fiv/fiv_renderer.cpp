@@ -133,15 +133,17 @@ void lightEachOther(FivScene& scene,
         places.back().normal = sample.point.geometric_normal;
     }
     scene.sent = SentLight(scene.objects, samples);
+    const std::vector<float> seen = samplesSeen(scene, samples);
     if (!scene.interreflection)
-        setGlow(scene, samples, std::vector<ObjectShading::Received>(places.size()));
+        setGlow(scene, samples, seen, std::vector<ObjectShading::Received>(places.size()));
     for (int round = 0; scene.interreflection && round < 3; ++round) {
-        if (round == 2) scene.room_change = roomChange(scene, receivers);
-        if (round > 0) shading.update(/*room_too=*/round == 2);
-        setGlow(scene, samples, shading.receive(places));
+        if (round == 2) {
+            scene.room_change = roomChange(scene, receivers);
+            shading.update();
+        }
+        setGlow(scene, samples, seen, shading.receive(places));
         progress.checkpoint();
     }
-    shading.update(/*room_too=*/false);
     receivers.update();
 }
 

@@ -22,23 +22,21 @@ LookOptions FivScene::limitsTowardObjects(glm::dvec3 place,
     return limits;
 }
 
-CellRadiance lightOfCells(const FivScene& scene, const PlaceLight& light, bool less_glow)
+CellRadiance lightOfCells(const PlaceLight& light)
 {
-    const std::size_t pairs = scene.coarse.cells().pairCount();
-    CellRadiance hideable{
+    const std::size_t pairs = light.radiance.size() / 2;
+    CellRadiance cells{
         std::vector<Rgb>(pairs), std::vector<Rgb>(pairs), std::vector<float>(pairs)};
-    for (std::size_t pair = 0; pair < pairs; ++pair)
-        hideable.solid_angles[pair] = light.geometry->solid_angles[2 * pair];
-    for (std::size_t cell = 0; cell < light.radiance.size(); ++cell)
-        (cell % 2 == 0 ? hideable.along : hideable.against)[cell / 2] =
-            light.geometry->solid_angles[cell] * (light.radiance[cell] + light.change[cell] -
-                                                  (less_glow ? scene.glow[cell] : Rgb(0.0f)));
-    return hideable;
-}
-
-CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light)
-{
-    return lightOfCells(scene, light, /*less_glow=*/true);
+    for (std::size_t pair = 0; pair < pairs; ++pair) {
+        const float solid_angle = light.geometry->solid_angles[2 * pair];
+        const auto arriving = [&](std::size_t cell) {
+            return solid_angle * (light.radiance[cell] + light.change[cell]);
+        };
+        cells.along[pair] = arriving(2 * pair);
+        cells.against[pair] = arriving(2 * pair + 1);
+        cells.solid_angles[pair] = solid_angle;
+    }
+    return cells;
 }
 
 }  // namespace insitu

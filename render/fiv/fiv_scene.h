@@ -62,13 +62,7 @@ struct FivScene {
     }
 };
 
-/// The light at a place, cell by cell of the scene's coarse atlas, whose cells `light` has; less
-/// what the objects themselves send along it, where asked.
-[[nodiscard]] CellRadiance lightOfCells(const FivScene& scene,
-                                        const PlaceLight& light,
-                                        bool less_glow);
-/// The light at a place less the objects' own: what they take from a surface when they hide it.
-/// `light` has the cells of the scene's coarse atlas.
-[[nodiscard]] CellRadiance hideableLight(const FivScene& scene, const PlaceLight& light);
+/// The light at a place, cell by cell of its atlas, changes of the room included.
+[[nodiscard]] CellRadiance lightOfCells(const PlaceLight& light);
 
 }  // namespace insitu

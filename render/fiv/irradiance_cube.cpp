@@ -1,5 +1,7 @@
 #include "render/fiv/irradiance_cube.h"
 
+#include "core/instruction_set.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -41,32 +43,95 @@ Rgb DirectionTable::lookUp(glm::dvec3 d) const
     return glm::max(above * (1.0f - ty) + below * ty, Rgb(0.0f));
 }
 
+namespace {
+
+/// Directions of one side of a table's pairs, and what is summed for each.
+struct PairSums {
+    explicit PairSums(const DirectionTable& table)
+        : x(table.size() / 2), y(x), z(x), red(x), green(x), blue(x)
+    {
+        for (std::size_t pair = 0; pair < x.size(); ++pair) {
+            const glm::vec3 d(table.direction(2 * pair));
+            x[pair] = d.x;
+            y[pair] = d.y;
+            z[pair] = d.z;
+        }
+    }
+    std::vector<float> x, y, z, red, green, blue;
+};
+
+// The table's directions are independent of each other: any vector's width gives the same bytes.
+INSITU_KERNEL void addEven(glm::vec3 d, Rgb light, PairSums& sums)
+{
+    const std::size_t count = sums.x.size();
+    const float* x = sums.x.data();
+    const float* y = sums.y.data();
+    const float* z = sums.z.data();
+    float* red = sums.red.data();
+    float* green = sums.green.data();
+    float* blue = sums.blue.data();
+    for (std::size_t i = 0; i < count; ++i) {
+        const float cosine = std::abs(x[i] * d.x + y[i] * d.y + z[i] * d.z);
+        red[i] += cosine * light.r;
+        green[i] += cosine * light.g;
+        blue[i] += cosine * light.b;
+    }
+}
+
+#if defined(__x86_64__)
+INSITU_TARGET_AVX2 void addEvenAvx2(glm::vec3 d, Rgb light, PairSums& sums)
+{
+    addEven(d, light, sums);
+}
+
+INSITU_TARGET_AVX512 void addEvenAvx512(glm::vec3 d, Rgb light, PairSums& sums)
+{
+    addEven(d, light, sums);
+}
+#endif
+
+void addEvenBase(glm::vec3 d, Rgb light, PairSums& sums)
+{
+    addEven(d, light, sums);
+}
+
+auto bestAddEven()
+{
+#if defined(__x86_64__)
+    if (bestInstructionSet() == InstructionSet::Avx512) return addEvenAvx512;
+    if (bestInstructionSet() == InstructionSet::Avx2) return addEvenAvx2;
+#endif
+    return addEvenBase;
+}
+
+}  // namespace
+
+// With w = n·ω, max(w, 0) = (|w| + w) / 2: of light A along ω and B along −ω, n gets the half sum
+// and −n the half difference of |w| (A + B), which is one sum for both, and of w (A − B), which is
+// linear in n, so that one vector a channel is the whole sum.
 DirectionTable irradianceCube(const PlaceLight& light, int face_size)
 {
     DirectionTable table(face_size);
-    const std::size_t count = table.size();
-    std::vector<float> x(count), y(count), z(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        const glm::vec3 d(table.direction(i));
-        x[i] = d.x;
-        y[i] = d.y;
-        z[i] = d.z;
-    }
-    // The table's directions innermost, so that they are worked on many at a time.
-    std::vector<float> red(count), green(count), blue(count);
-    for (std::size_t cell = 0; cell < light.radiance.size(); ++cell) {
-        const Rgb radiance = glm::max(light.radiance[cell] + light.change[cell], Rgb(0.0f));
+    PairSums even(table);
+    glm::dmat3 odd(0.0);  // a column a channel
+    const auto add = bestAddEven();
+    for (std::size_t cell = 0; cell < light.radiance.size(); cell += 2) {
         const glm::vec3 d = light.geometry->directions[cell];
         const float solid_angle = light.geometry->solid_angles[cell];
-        for (std::size_t i = 0; i < count; ++i) {
-            const float weight = std::max(x[i] * d.x + y[i] * d.y + z[i] * d.z, 0.0f) * solid_angle;
-            red[i] += weight * radiance.r;
-            green[i] += weight * radiance.g;
-            blue[i] += weight * radiance.b;
-        }
+        const auto arriving = [&](std::size_t from) {
+            return solid_angle * glm::max(light.radiance[from] + light.change[from], Rgb(0.0f));
+        };
+        const Rgb along = arriving(cell);
+        const Rgb against = arriving(cell + 1);
+        add(d, along + against, even);
+        odd += glm::outerProduct(glm::dvec3(d), glm::dvec3(along - against));
     }
-    for (std::size_t i = 0; i < count; ++i)
-        table[i] = {red[i], green[i], blue[i]};
+    for (std::size_t pair = 0; pair < even.x.size(); ++pair) {
+        const Rgb sum(even.red[pair], even.green[pair], even.blue[pair]);
+        const Rgb difference(table.direction(2 * pair) * odd);
+        table[2 * pair] = glm::max(0.5f * (sum + difference), Rgb(0.0f));
+        table[2 * pair + 1] = glm::max(0.5f * (sum - difference), Rgb(0.0f));
+    }
     return table;
 }
 

@@ -62,29 +62,27 @@ ObjectShading::ObjectShading(const FivScene& scene, const ObjectLightOptions& op
     near_m_ = (static_cast<double>(options.bias_texels) - 0.5) * texels_m /
               static_cast<double>(set.frames.size());
     lookFromNodes(options.node_spacing_m);
-    update(/*room_too=*/true);
+    update();
 }
 
-void ObjectShading::update(bool room_too)
+void ObjectShading::update()
 {
-    if (room_too) {
-        parallelFor(0, static_cast<std::int64_t>(lights_.size()), [&](std::int64_t number) {
-            PlaceLight& light = lights_[static_cast<std::size_t>(number)];
-            light.setChange(scene_.room_change);
-            nodes_[static_cast<std::size_t>(number)] = irradianceCube(light, kIrradianceCube);
-        });
-        mean_ = lights_.front();
-        for (std::size_t cell = 0; cell < mean_.radiance.size(); ++cell) {
-            for (std::size_t i = 1; i < lights_.size(); ++i) {
-                mean_.radiance[cell] += lights_[i].radiance[cell];
-                mean_.change[cell] += lights_[i].change[cell];
-            }
-            mean_.radiance[cell] /= static_cast<float>(lights_.size());
-            mean_.change[cell] /= static_cast<float>(lights_.size());
+    parallelFor(0, static_cast<std::int64_t>(lights_.size()), [&](std::int64_t number) {
+        PlaceLight& light = lights_[static_cast<std::size_t>(number)];
+        light.setChange(scene_.room_change);
+        nodes_[static_cast<std::size_t>(number)] = irradianceCube(light, kIrradianceCube);
+    });
+    PlaceLight mean = lights_.front();
+    for (std::size_t cell = 0; cell < mean.radiance.size(); ++cell) {
+        for (std::size_t i = 1; i < lights_.size(); ++i) {
+            mean.radiance[cell] += lights_[i].radiance[cell];
+            mean.change[cell] += lights_[i].change[cell];
         }
-        mean_irradiance_ = irradianceCube(mean_, kIrradianceCube);
+        mean.radiance[cell] /= static_cast<float>(lights_.size());
+        mean.change[cell] /= static_cast<float>(lights_.size());
     }
-    hideable_ = lightOfCells(scene_, mean_, /*less_glow=*/false);
+    mean_irradiance_ = irradianceCube(mean, kIrradianceCube);
+    hideable_ = lightOfCells(mean);
 }
 
 void ObjectShading::lookFromNodes(double spacing_m)

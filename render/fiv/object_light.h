@@ -25,8 +25,8 @@ struct ObjectLightOptions {
 class ObjectShading {
 public:
     ObjectShading(const FivScene& scene, const ObjectLightOptions& options);
-    /// To be called when the scene's glow (and, with `room_too`, its room_change) has changed.
-    void update(bool room_too);
+    /// To be called when the scene's room_change has changed.
+    void update();
 
     /// A point of an object that is to be lit.
     struct Place {
@@ -67,9 +67,8 @@ private:
     glm::ivec3 node_count_{1};
     std::vector<PlaceLight> lights_;     ///< one a node
     std::vector<DirectionTable> nodes_;  ///< their irradiance
-    PlaceLight mean_;
     DirectionTable mean_irradiance_;
-    CellRadiance hideable_;
+    CellRadiance hideable_;  ///< mean light of the nodes
 };
 
 /// What of even light the surface reflects in all.

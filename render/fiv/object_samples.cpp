@@ -63,18 +63,37 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
     return samples;
 }
 
-void setGlow(FivScene& scene,
-             std::span<const ObjectSample> samples,
-             std::span<const ObjectShading::Received> received)
+std::vector<float> samplesSeen(const FivScene& scene, std::span<const ObjectSample> samples)
 {
     const SilhouetteSet& set = scene.coarse.silhouettes;
     const std::size_t pairs = scene.coarse.cells().pairCount();
+    std::vector<glm::vec3> local;
+    for (const ObjectSample& sample : samples)
+        local.push_back(scene.frame().localFrom(sample.point.position));
+    std::vector<float> seen(pairs * samples.size());
+    parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
+        const auto pair = static_cast<std::size_t>(number);
+        for (std::size_t i = 0; i < samples.size(); ++i) {
+            const double cosine = glm::dot(samples[i].point.geometric_normal, set.directions[pair]);
+            const HiddenShares shares = hiddenShares(set, pair, local[i], 1.5f);
+            const double hidden = cosine > 0.0 ? shares.along : shares.against;
+            seen[pair * samples.size() + i] =
+                static_cast<float>(cosine * (1.0 - hidden) * samples[i].area);
+        }
+    });
+    return seen;
+}
+
+void setGlow(FivScene& scene,
+             std::span<const ObjectSample> samples,
+             std::span<const float> seen,
+             std::span<const ObjectShading::Received> received)
+{
+    const std::size_t pairs = scene.coarse.cells().pairCount();
     std::vector<Rgb> sent(samples.size());
-    std::vector<glm::vec3> local(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const SurfaceMaterial& m = samples[i].point.material;
         sent[i] = m.emissive + evenReflectance(m) * (received[i].smooth + received[i].spots) / kPi;
-        local[i] = scene.frame().localFrom(samples[i].point.position);
     }
     std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
     ObjectGlow near;
@@ -87,18 +106,15 @@ void setGlow(FivScene& scene,
     scene.near = std::move(near);
     scene.sent.update(sent);
     parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
-        const std::size_t pair = static_cast<std::size_t>(number);
+        const auto pair = static_cast<std::size_t>(number);
         glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
         double weights[2] = {0.0, 0.0};
         for (std::size_t i = 0; i < samples.size(); ++i) {
-            const double cosine = glm::dot(samples[i].point.geometric_normal, set.directions[pair]);
+            const double weight = seen[pair * samples.size() + i];
             // What faces ω is seen by those who look along −ω.
-            const int side = cosine > 0.0 ? 1 : 0;
-            const HiddenShares shares = hiddenShares(set, pair, local[i], 1.5f);
-            const double hidden = cosine > 0.0 ? shares.along : shares.against;
-            const double weight = std::abs(cosine) * (1.0 - hidden) * samples[i].area;
-            sums[side] += weight * glm::dvec3(sent[i]);
-            weights[side] += weight;
+            const int side = weight > 0.0 ? 1 : 0;
+            sums[side] += std::abs(weight) * glm::dvec3(sent[i]);
+            weights[side] += std::abs(weight);
         }
         for (int side = 0; side < 2; ++side)
             if (weights[side] > 0.0)
