@@ -49,28 +49,6 @@ Source sourceOf(const SilhouetteSet* set,
     return source;
 }
 
-Source sourceOf(const SilhouetteSet& set, const CellRadiance& light)
-{
-    Source source;
-    source.set = &set;
-    source.shines.resize(light.along.size());
-    const auto list = [&](const std::vector<Rgb>& from, float side, unsigned bit) {
-        std::vector<float> flux;
-        flux.reserve(from.size() * fluxNumbers(Sum::Radiance));
-        for (std::size_t i = 0; i < from.size(); ++i) {
-            const glm::vec3 d = side * glm::vec3(set.directions[i]);
-            flux.insert(flux.end(),
-                        {d.x, d.y, d.z, from[i].r, from[i].g, from[i].b, light.solid_angles[i]});
-            if (light.solid_angles[i] > 0.0f)
-                source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
-        }
-        return flux;
-    };
-    source.along = list(light.along, 1.0f, 1u);
-    source.against = list(light.against, -1.0f, 2u);
-    return source;
-}
-
 Source sourceOfCorners(const SilhouetteSet& set, const CornerIrradiance& light)
 {
     using Corners = CornerIrradiance::Corners;

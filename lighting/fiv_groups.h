@@ -18,8 +18,6 @@ namespace insitu::fiv {
                               Sum sum,
                               glm::vec3 normal);
 
-/// The same for Sum::Radiance.
-[[nodiscard]] Source sourceOf(const SilhouetteSet& set, const CellRadiance& light);
 /// The same for four lights at once, Sum::Corners.
 [[nodiscard]] Source sourceOfCorners(const SilhouetteSet& set, const CornerIrradiance& light);
 

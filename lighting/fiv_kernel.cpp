@@ -14,7 +14,7 @@ namespace {
 template <Sum kSum>
 INSITU_KERNEL void accumulateAll(const float* flux, Projected& p, Block& block)
 {
-    if constexpr (kSum == Sum::PerPlace || kSum == Sum::Radiance) {
+    if constexpr (kSum == Sum::PerPlace) {
         for (int i = 0; i < kSize; ++i)
             p.along[i] = 1.0f;
         accumulate<kSum>(p.along, flux, block);
@@ -51,8 +51,8 @@ INSITU_KERNEL std::uint32_t litSides(std::uint32_t sides,
                                      const float* along,
                                      const float* against)
 {
-    constexpr int kVectors = kSum == Sum::PerPlace ? 3 : kSum == Sum::Radiance ? 1 : 0;
-    if constexpr (kVectors == 0) return sides;
+    if constexpr (kSum != Sum::PerPlace) return sides;
+    constexpr int kVectors = 3;  // one a channel
     const auto falls = [&](const float* vectors) {
         bool any = false;
         for (int c = 0; c < kVectors; ++c)
@@ -213,8 +213,6 @@ INSITU_KERNEL void sumAny(Sum sum, const Job& job)
             return sumJob<Sum::Irradiance>(job);
         case Sum::PerPlace:
             return sumJob<Sum::PerPlace>(job);
-        case Sum::Radiance:
-            return sumJob<Sum::Radiance>(job);
         case Sum::Corners:
             return sumJob<Sum::Corners>(job);
     }

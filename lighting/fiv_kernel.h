@@ -56,9 +56,6 @@ enum class Sum {
     Vectors,     ///< its irradiance vector: 9 sums, flux of 9 numbers a direction
     Irradiance,  ///< irradiance of one common normal: 3 sums, flux of 3 numbers a direction
     PerPlace,    ///< max(0, N·vector) with each place's own normal: 3 sums, flux of 9 numbers
-    /// max(0, N·ω) radiance, each place's own normal: 3 sums and one for a sky of radiance 1; flux
-    /// of ω, radiance and solid angle.
-    Radiance,
     /// Irradiance of one common normal in four lights: 12 sums and one for a sky of radiance 1,
     /// flux of as many numbers.
     Corners,
@@ -68,8 +65,6 @@ enum class Sum {
     switch (sum) {
         case Sum::Irradiance:
             return 3;
-        case Sum::Radiance:
-            return 7;
         case Sum::Corners:
             return 13;
         case Sum::Vectors:

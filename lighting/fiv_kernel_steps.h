@@ -211,16 +211,6 @@ INSITU_KERNEL void accumulate(const float* share, const float* flux, Block& bloc
                 block.sums[c][i] += share[i] * (cosine > 0.0f ? cosine : 0.0f);
             }
         }
-    } else if constexpr (kSum == Sum::Radiance) {
-        for (int i = 0; i < kSize; ++i) {
-            const float cosine =
-                flux[0] * block.nx[i] + flux[1] * block.ny[i] + flux[2] * block.nz[i];
-            const float weight = share[i] * (cosine > 0.0f ? cosine : 0.0f);
-            block.sums[0][i] += weight * flux[3];
-            block.sums[1][i] += weight * flux[4];
-            block.sums[2][i] += weight * flux[5];
-            block.sums[3][i] += weight * flux[6];
-        }
     } else {
         for (int k = 0; k < fluxNumbers(kSum); ++k) {
             const float number = flux[k];

@@ -51,8 +51,7 @@ void sumHidden(const std::vector<Source>& sources,
     });
 }
 
-template <class Light>
-void checkLight(const Light& light, const VisibilityAtlas& atlas)
+void checkLight(const CornerIrradiance& light, const VisibilityAtlas& atlas)
 {
     INSITU_CHECK(light.along.size() == atlas.cells().pairCount() &&
                      light.against.size() == light.along.size(),
@@ -152,30 +151,6 @@ void hiddenIrradiance(const ObjectLight& object,
               [&](const Block& block, std::size_t place, std::size_t i) {
                   hidden[place] = fiv::irradianceOf(block, i);
               });
-}
-
-void hiddenIrradiance(const VisibilityAtlas& atlas,
-                      const CellRadiance& light,
-                      std::span<const glm::vec3> places,
-                      std::span<const glm::vec3> unit_normals,
-                      std::span<HiddenIrradiance> hidden,
-                      float bias_texels)
-{
-    INSITU_CHECK(places.size() == hidden.size() && places.size() == unit_normals.size(),
-                 "{} and {} for {}",
-                 hidden.size(),
-                 unit_normals.size(),
-                 places.size());
-    checkLight(light, atlas);
-    sumHidden(
-        {fiv::sourceOf(atlas.silhouettes, light)},
-        Sum::Radiance,
-        places,
-        unit_normals,
-        bias_texels,
-        [&](const Block& block, std::size_t place, std::size_t i) {
-            hidden[place] = {fiv::irradianceOf(block, i), block.sums[3][i] + block.uniform[3]};
-        });
 }
 
 void hiddenIrradiance(const VisibilityAtlas& atlas,

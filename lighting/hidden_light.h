@@ -70,19 +70,6 @@ struct HiddenIrradiance {
     Rgb light{0.0f};
     float sky = 0.0f;  ///< of a sky of radiance 1: π times the form factor from place to objects
 };
-/// Radiance of an atlas's cells times their solid angles, one a pair; each shines from its centre.
-/// Negative where what hides is brighter than what it hides.
-struct CellRadiance {
-    std::vector<Rgb> along, against;
-    std::vector<float> solid_angles;  ///< of either cell of a pair
-};
-void hiddenIrradiance(const VisibilityAtlas& atlas,
-                      const CellRadiance& light,
-                      std::span<const glm::vec3> places_local,
-                      std::span<const glm::vec3> unit_normals,
-                      std::span<HiddenIrradiance> hidden,
-                      float bias_texels = 0.0f);
-
 /// Irradiance that the cells of an atlas give surfaces of one normal, in four lights at once: those
 /// seen from the corners of a square of receivers, in which light is bilinear.
 struct CornerIrradiance {

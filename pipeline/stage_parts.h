@@ -177,7 +177,7 @@ void parts(auto& archive, PartsOf<AtlasOptions> auto& v)
 void parts(auto& archive, PartsOf<FivOptions> auto& v)
 {
     archive(v.atlas, v.object_face_size, v.receiver_node_spacing_m, v.object_node_spacing_m);
-    archive(v.bias_texels, v.interpolation_tolerance, v.light, v.object_samples);
+    archive(v.interpolation_tolerance, v.light, v.object_samples);
 }
 void parts(auto& archive, PartsOf<InsertionOptions> auto& v)
 {
@@ -190,7 +190,7 @@ static_assert(sizeof(AlignmentOptions) == 32 && sizeof(DeghostOptions) == 24);
 static_assert(sizeof(CaptureOptions) == 208);
 static_assert(sizeof(RoomLightOptions) == 80 && sizeof(PathOptions) == 8);
 static_assert(sizeof(InterreflectionOptions) == 32 && sizeof(IrradianceFilterOptions) == 16);
-static_assert(sizeof(AtlasOptions) == 12 && sizeof(FivOptions) == 96);
-static_assert(sizeof(InsertionOptions) == 192);
+static_assert(sizeof(AtlasOptions) == 12 && sizeof(FivOptions) == 88);
+static_assert(sizeof(InsertionOptions) == 184);
 
 }  // namespace insitu

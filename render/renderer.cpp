@@ -43,7 +43,6 @@ Findings InsertionOptions::validate() const
            "fiv.object_face_size must be in [4, 64]");
     demand(fiv.receiver_node_spacing_m > 0.0, "fiv.receiver_node_spacing_m must be > 0");
     demand(fiv.object_node_spacing_m > 0.0, "fiv.object_node_spacing_m must be > 0");
-    demand(fiv.bias_texels >= 0.0f, "fiv.bias_texels must be >= 0");
     demand(fiv.interpolation_tolerance >= 0.0, "fiv.interpolation_tolerance must be >= 0");
     demand(fiv.object_samples > 0, "fiv.object_samples must be > 0");
     return findings;

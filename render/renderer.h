@@ -43,9 +43,6 @@ struct FivOptions {
     double receiver_node_spacing_m = 0.5;
     /// The same around the objects.
     double object_node_spacing_m = 0.3;
-    /// How far behind an object's surface a place on it must lie to be hidden, texels of a
-    /// silhouette, >= 0.
-    float bias_texels = 1.5f;
     /// Between pixels, with/without is interpolated where that is off by less than this, >= 0.
     double interpolation_tolerance = 0.002;
     FivLight light = FivLight::Room;

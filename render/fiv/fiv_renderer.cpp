@@ -1,5 +1,6 @@
 #include "render/fiv/fiv_renderer.h"
 
+#include "lighting/sampling.h"
 #include "render/cut_outs.h"
 #include "render/fiv/object_light.h"
 #include "render/fiv/object_pixels.h"
@@ -19,6 +20,8 @@ double secondsSince(std::chrono::steady_clock::time_point start)
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Rays in all from each sample of the objects; they have no neighbours to share with.
+constexpr int kSampleRays = 64;
 /// Parts of cut-out triangles along the longest side of their model: an atlas's samples.
 constexpr double kPartsAlong = 128.0;
 
@@ -91,12 +94,9 @@ FivScene makeScene(const RoomLight& room,
     const std::clock_t worked = std::clock();
     AtlasOptions fine = fiv.atlas;
     fine.resolution = sharedResolution(all, fine.resolution);
-    AtlasOptions coarse = fine;
-    coarse.face_size = fiv.object_face_size;
     FivScene scene{room,
                    objects,
                    atlasOf(all, fine, fiv, result, progress),
-                   atlasOf(all, coarse, fiv, result, progress),
                    {},
                    {},
                    {},
@@ -109,11 +109,12 @@ FivScene makeScene(const RoomLight& room,
     result.table_seconds = secondsSince(start);
     result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
     scene.cells = std::make_shared<CellGeometry>(scene.atlas.cells());
-    scene.coarse_cells = std::make_shared<CellGeometry>(scene.coarse.cells());
+    scene.coarse_cells =
+        std::make_shared<CellGeometry>(DirectionCells{fiv.object_face_size, scene.atlas.axes});
     scene.spots = LightSpots(room, scene.frame().center, LightSpotOptions{});
     for (std::size_t i = 0; i < scene.room_change.size(); ++i)
         scene.room_change[i] = Rgb(0.0f);
-    scene.glow.assign(2 * scene.coarse.cells().pairCount(), Rgb(0.0f));
+    scene.glow.assign(scene.coarse_cells->directions.size(), Rgb(0.0f));
     return scene;
 }
 
@@ -131,17 +132,24 @@ void lightEachOther(FivScene& scene,
     for (const ObjectSample& sample : samples) {
         places.push_back(ObjectShading::placeOf(sample.point));
         places.back().normal = sample.point.geometric_normal;
+        places.back().shift = r2Point(static_cast<double>(places.size()));
     }
+    const auto received = [&] {
+        std::vector<Rgb> irradiance;
+        for (const ObjectShading::Received& r : shading.receive(places, kSampleRays))
+            irradiance.push_back(r.smooth() + r.spots);
+        return irradiance;
+    };
     scene.sent = SentLight(scene.objects, samples);
     const std::vector<float> seen = samplesSeen(scene, samples);
     if (!scene.interreflection)
-        setGlow(scene, samples, seen, std::vector<ObjectShading::Received>(places.size()));
+        setGlow(scene, samples, seen, std::vector<Rgb>(samples.size(), Rgb(0.0f)));
     for (int round = 0; scene.interreflection && round < 3; ++round) {
         if (round == 2) {
             scene.room_change = roomChange(scene, receivers);
             shading.update();
         }
-        setGlow(scene, samples, seen, shading.receive(places));
+        setGlow(scene, samples, seen, received());
         progress.checkpoint();
     }
     receivers.update();
@@ -181,7 +189,7 @@ InsertionResult renderFiv(const Camera& camera,
     const FivOptions& fiv = options.fiv;
     FivScene scene =
         makeScene(room, objects, all, fiv, options.interreflection.enabled, result, progress);
-    ObjectShading shading(scene, {fiv.object_node_spacing_m, fiv.bias_texels});
+    ObjectShading shading(scene, fiv.object_node_spacing_m);
     ReceiverLight light(scene, fiv.receiver_node_spacing_m);
     lightEachOther(scene, shading, light, fiv, progress);
     progress.report("fiv", 0.3);

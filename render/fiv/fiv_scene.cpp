@@ -22,21 +22,4 @@ LookOptions FivScene::limitsTowardObjects(glm::dvec3 place,
     return limits;
 }
 
-CellRadiance lightOfCells(const PlaceLight& light)
-{
-    const std::size_t pairs = light.radiance.size() / 2;
-    CellRadiance cells{
-        std::vector<Rgb>(pairs), std::vector<Rgb>(pairs), std::vector<float>(pairs)};
-    for (std::size_t pair = 0; pair < pairs; ++pair) {
-        const float solid_angle = light.geometry->solid_angles[2 * pair];
-        const auto arriving = [&](std::size_t cell) {
-            return solid_angle * (light.radiance[cell] + light.change[cell]);
-        };
-        cells.along[pair] = arriving(2 * pair);
-        cells.against[pair] = arriving(2 * pair + 1);
-        cells.solid_angles[pair] = solid_angle;
-    }
-    return cells;
-}
-
 }  // namespace insitu

@@ -18,25 +18,24 @@ namespace insitu {
 struct FivScene {
     const RoomLight& room;
     const ObjectScene& objects;
-    VisibilityAtlas atlas;   ///< many directions: what receivers lose
-    VisibilityAtlas coarse;  ///< fewer: light on the objects themselves, and on the room's cells
+    VisibilityAtlas atlas;                             ///< what receivers lose
     std::shared_ptr<const CellGeometry> cells;         ///< of `atlas`
-    std::shared_ptr<const CellGeometry> coarse_cells;  ///< of `coarse`
+    std::shared_ptr<const CellGeometry> coarse_cells;  ///< fewer, for the objects' own light
     LightSpots spots;
     FivLight light = FivLight::Room;
     FaceGrid<Rgb> room_change;  ///< ΔL of the room's surfaces, on its cell grid
     /// Mean radiance of the objects' surfaces that are seen along a direction: a value for each
-    /// cell of `coarse`, number 2·pair + side as in PlaceLight. What hides light sends this
+    /// cell of `coarse_cells`, number 2·pair + side as in PlaceLight. What hides light sends this
     /// instead.
     std::vector<Rgb> glow;
     ObjectGlow near;  ///< what of that is different close to the objects
     SentLight sent;   ///< and what they show themselves and each other
     bool interreflection = true;
 
-    [[nodiscard]] const LocalFrame& frame() const { return coarse.silhouettes.local; }
+    [[nodiscard]] const LocalFrame& frame() const { return atlas.silhouettes.local; }
     [[nodiscard]] Rgb glowAlong(glm::dvec3 direction) const
     {
-        const DirectedPair cell = coarse.cells().cellAt(direction);
+        const DirectedPair cell = coarse_cells->cells.cellAt(direction);
         return glow[2 * cell.pair + static_cast<std::size_t>(cell.side)];
     }
     /// The cells of one of the scene's atlases that the objects might hide from any place within
@@ -61,8 +60,5 @@ struct FivScene {
                (along > 0.0 || glm::dot(way, way) <= r2);
     }
 };
-
-/// The light at a place, cell by cell of its atlas, changes of the room included.
-[[nodiscard]] CellRadiance lightOfCells(const PlaceLight& light);
 
 }  // namespace insitu

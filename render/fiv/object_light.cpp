@@ -7,7 +7,6 @@
 #include "render/bsdf/ggx_albedo.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -18,9 +17,9 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaxNodesAlong = 6;
 constexpr int kIrradianceCube = 16;
-/// Rays of a place: the first few, and all where one of these meets something near.
-constexpr int kFirstRays = 16;
-constexpr int kNearRays = 32;
+constexpr double kGoldenRatio = 0.6180339887498949;
+/// Rays along a cell's side from the nodes: at the edges of windows the light of a cell is mixed.
+constexpr int kNodeRaysAlong = 3;
 
 /// What of diffuse light the base reflects: a coat lets less through at grazing views.
 Rgb diffuseReflectance(const SurfaceMaterial& m, double cosine)
@@ -51,17 +50,9 @@ ObjectShading::Place ObjectShading::placeOf(const SurfacePoint& point)
     return {point.position, point.shading_normal, point.geometric_normal};
 }
 
-ObjectShading::ObjectShading(const FivScene& scene, const ObjectLightOptions& options)
-    : scene_(scene), options_(options)
+ObjectShading::ObjectShading(const FivScene& scene, double node_spacing_m) : scene_(scene)
 {
-    const SilhouetteSet& set = scene.coarse.silhouettes;
-    double texels_m = 0.0;
-    for (const SilhouetteFrame& frame : set.frames)
-        texels_m += set.local.radius * static_cast<double>(frame.texel_depth) /
-                    glm::length(glm::dvec3(frame.depth_axis));
-    near_m_ = (static_cast<double>(options.bias_texels) - 0.5) * texels_m /
-              static_cast<double>(set.frames.size());
-    lookFromNodes(options.node_spacing_m);
+    lookFromNodes(node_spacing_m);
     update();
 }
 
@@ -72,17 +63,6 @@ void ObjectShading::update()
         light.setChange(scene_.room_change);
         nodes_[static_cast<std::size_t>(number)] = irradianceCube(light, kIrradianceCube);
     });
-    PlaceLight mean = lights_.front();
-    for (std::size_t cell = 0; cell < mean.radiance.size(); ++cell) {
-        for (std::size_t i = 1; i < lights_.size(); ++i) {
-            mean.radiance[cell] += lights_[i].radiance[cell];
-            mean.change[cell] += lights_[i].change[cell];
-        }
-        mean.radiance[cell] /= static_cast<float>(lights_.size());
-        mean.change[cell] /= static_cast<float>(lights_.size());
-    }
-    mean_irradiance_ = irradianceCube(mean, kIrradianceCube);
-    hideable_ = lightOfCells(mean);
 }
 
 void ObjectShading::lookFromNodes(double spacing_m)
@@ -120,8 +100,8 @@ void ObjectShading::lookFromNodes(double spacing_m)
                 place = center + way / length * std::max(0.0, wall->distance_m - 0.02);
         }
         if (scene_.light != FivLight::Room) place = scene_.frame().center;
-        lights_[static_cast<std::size_t>(number)] =
-            lookAround(scene_.room, scene_.spots, place, scene_.coarse_cells);
+        lights_[static_cast<std::size_t>(number)] = lookAround(
+            scene_.room, scene_.spots, place, scene_.coarse_cells, {.rays_along = kNodeRaysAlong});
     });
 }
 
@@ -169,100 +149,80 @@ Rgb ObjectShading::spotIrradiance(const Place& place) const
     return Rgb(sum);
 }
 
-ObjectShading::Around ObjectShading::lookAtObjects(const Place& place) const
+RayLight ObjectShading::rayLight(const Place& place, int rays) const
 {
     SurfacePoint point;
     point.position = place.position;
     point.geometric_normal = place.geometric_normal;
     const glm::dvec3 start = scene_.objects.leave(point, place.geometric_normal);
+    const glm::dvec3 from = scene_.light == FivLight::Room ? start : scene_.frame().center;
     const glm::dmat3 to_world = frameFromNormal(place.normal);
-    std::array<glm::dvec3, kNearRays> near;
-    std::array<glm::dvec3, kNearRays> passed;
-    std::size_t near_count = 0;
-    std::size_t passed_count = 0;
-    Around around;
-    int met_count = 0;
-    int rays = kFirstRays;
-    for (int i = 0; i < rays; ++i) {
-        const glm::dvec3 direction = to_world * cosineHemisphere(r2Point(i));
-        // Below the surface by its own curvature, not by what lies near.
-        const auto met = glm::dot(direction, place.geometric_normal) > 0.0
-                             ? scene_.objects.intersect(start, direction)
-                             : std::nullopt;
-        if (met && met->distance_m < near_m_) {
-            near[near_count++] = direction;
-            around.sent_nearby += scene_.sent.at(met->position, met->geometric_normal);
-        } else {
-            passed[passed_count++] = direction;
-            if (met) {
-                around.sent += scene_.sent.at(met->position, met->geometric_normal);
-                ++met_count;
-            }
-        }
-        if (i + 1 == kFirstRays && near_count > 0) rays = kNearRays;
-    }
-    // Where rays meet nothing, what the atlas takes for hidden is the surface's own beginning.
-    around.sent = met_count > 0 ? around.sent / static_cast<float>(met_count)
-                                : scene_.sent.at(place.position, place.normal);
-    if (near_count == 0) return around;
-    around.sent_nearby /= static_cast<float>(near_count);
-    // What is thick hides in the atlas too: it counts once.
-    const glm::vec3 local = scene_.frame().localFrom(place.position);
-    const auto open = [&](std::span<const glm::dvec3> directions) {
-        float sum = 0.0f;
-        for (const glm::dvec3& direction : directions)
-            sum += 1.0f - hiddenShare(scene_.coarse, local, direction, options_.bias_texels);
-        return sum;
+    const int draws = rays / 2;
+    RayLight light;
+    // Cosine and light sampling joined by the balance heuristic [Veach97, 9.2].
+    const auto add = [&](glm::dvec3 direction, const RoomLight::Arrival& arrival, double density) {
+        const double cosine = glm::dot(direction, place.normal);
+        // What is below the surface only by its own curvature tells nothing of what lies near.
+        if (cosine <= 0.0 || glm::dot(direction, place.geometric_normal) <= 0.0) return;
+        const auto weight =
+            static_cast<float>(cosine / (cosine / static_cast<double>(kPi) + density) / draws);
+        Rgb radiance(0.0f);
+        if (!scene_.spots.holds(arrival, direction)) radiance = arrival.radiance;
+        if (arrival.hit && !arrival.hit->opening)
+            radiance += scene_.room_change.lookUp(arrival.hit->face, arrival.hit->uv, Rgb(0.0f));
+        const Rgb arriving = weight * glm::max(radiance, Rgb(0.0f));
+        light.all += arriving;
+        if (const auto met = scene_.objects.intersect(start, direction, arrival.distance_m))
+            light.sent += weight * scene_.sent.at(met->position, met->geometric_normal);
+        else
+            light.passed += arriving;
     };
-    const float lost = open({near.data(), near_count});
-    const float left = open({passed.data(), passed_count});
-    around.hidden_nearby = lost + left > 0.0f ? lost / (lost + left) : 0.0f;
-    return around;
+    for (int i = 0; i < draws; ++i) {
+        const glm::dvec2 u = r2Point(i, place.shift);
+        const glm::dvec3 direction = to_world * cosineHemisphere(u);
+        const RoomLight::Arrival arrival = scene_.room.arrive(from, direction);
+        add(direction, arrival, scene_.room.pdf(arrival, direction));
+        // Which light is drawn matters more than where on it: evenly by itself.
+        const double selector = glm::fract(place.shift.x + i * kGoldenRatio);
+        if (const auto drawn = scene_.room.draw(from, selector, u))
+            add(drawn->direction, drawn->arrival, drawn->pdf);
+    }
+    return light;
 }
 
-std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Place> places) const
+std::vector<ObjectShading::Received> ObjectShading::receive(std::span<const Place> places,
+                                                            int rays) const
 {
-    std::vector<glm::vec3> local(places.size());
-    std::vector<glm::vec3> normals(places.size());
-    for (std::size_t i = 0; i < places.size(); ++i) {
-        local[i] = scene_.frame().localFrom(places[i].position);
-        normals[i] = glm::vec3(places[i].normal);
-    }
-    std::vector<HiddenIrradiance> lost(places.size());
-    if (scene_.light != FivLight::Cube)
-        hiddenIrradiance(scene_.coarse, hideable_, local, normals, lost, options_.bias_texels);
     std::vector<Received> result(places.size());
     parallelFor(0, static_cast<std::int64_t>(places.size()), [&](std::int64_t number) {
-        const auto i = static_cast<std::size_t>(number);
-        const Rgb all = mean_irradiance_.lookUp(places[i].normal);
-        const Rgb left = glm::max(all - lost[i].light, Rgb(0.0f));
-        const Rgb open = openIrradiance(places[i]);
-        Received& r = result[i];
-        for (int c = 0; c < 3; ++c)
-            r.smooth[c] = all[c] > 0.0f ? open[c] * (left[c] / all[c]) : 0.0f;
-        if (scene_.light != FivLight::Cube) {
-            const Around around = lookAtObjects(places[i]);
-            r.smooth += lost[i].sky * around.sent;
-            const float hidden = around.hidden_nearby;
-            r.smooth = r.smooth * (1.0f - hidden) +
-                       hidden * std::max(kPi - lost[i].sky, 0.0f) * around.sent_nearby;
-        }
-        if (!scene_.spots.spots().empty()) r.spots = spotIrradiance(places[i]);
+        const Place& place = places[static_cast<std::size_t>(number)];
+        Received& received = result[static_cast<std::size_t>(number)];
+        received.open = openIrradiance(place);
+        received.rays = scene_.light == FivLight::Cube ? RayLight{Rgb(1.0f), Rgb(1.0f), Rgb(0.0f)}
+                                                       : rayLight(place, rays);
+        if (!scene_.spots.spots().empty()) received.spots = spotIrradiance(place);
     });
     return result;
 }
 
-Gloss ObjectShading::radiance(const SurfacePoint& point,
-                              glm::dvec3 wo,
-                              const Received& received,
-                              const LobeDraw& draw) const
+void ObjectShading::add(const SurfacePoint& point,
+                        glm::dvec3 wo,
+                        const Received& received,
+                        const LobeDraw& draw,
+                        ObjectPixel& pixel,
+                        Rgb& radiance) const
 {
-    Gloss seen;
-    if (isGlossy(point.material)) seen = glossyRadiance(scene_, point, wo, received.spots, draw);
     const double cosine = std::abs(glm::dot(point.shading_normal, wo));
-    seen.sharp += point.material.emissive + diffuseReflectance(point.material, cosine) *
-                                                (received.smooth + received.spots) / kPi;
-    return seen;
+    const Rgb matt = diffuseReflectance(point.material, cosine) / kPi;
+    pixel.matt += matt;
+    pixel.matt_open += matt * received.open;
+    pixel.rays += received.rays;
+    radiance += point.material.emissive + matt * received.spots;
+    if (!isGlossy(point.material)) return;
+    const Gloss gloss = glossyRadiance(scene_, point, wo, received.spots, draw);
+    pixel.glossy += gloss.reflectance;
+    pixel.gathered += gloss.gathered;
+    radiance += gloss.sharp;
 }
 
 }  // namespace insitu

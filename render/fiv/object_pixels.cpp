@@ -2,7 +2,7 @@
 
 #include "core/parallel.h"
 #include "lighting/see_through.h"
-#include "render/fiv/gloss_filter.h"
+#include "render/fiv/object_sharing.h"
 
 #include <algorithm>
 #include <array>
@@ -13,6 +13,8 @@ namespace insitu {
 namespace {
 
 constexpr int kTile = 64;
+/// Of a place, to the light and over the hemisphere.
+constexpr int kRays = 12;
 /// Rays of every pixel that may show an object, and those added where it shows something else too.
 constexpr int kInner = 4;
 constexpr int kAll = 16;
@@ -119,8 +121,10 @@ private:
 /// Points that lie on one smooth piece of surface are lit as their mean.
 void listPlaces(PixelPoints& pixel, std::vector<ObjectShading::Place>& places)
 {
+    const glm::dvec2 shift = LobeDraw::of(pixel.pixel, 0).shift;
     const SurfacePoint& first = pixel.points.front();
     ObjectShading::Place mean = ObjectShading::placeOf(first);
+    mean.shift = shift;
     bool together = true;
     for (std::size_t i = 1; i < pixel.points.size() && together; ++i) {
         const SurfacePoint& point = pixel.points[i];
@@ -140,6 +144,7 @@ void listPlaces(PixelPoints& pixel, std::vector<ObjectShading::Place>& places)
     for (const SurfacePoint& point : pixel.points) {
         pixel.place.push_back(places.size());
         places.push_back(ObjectShading::placeOf(point));
+        places.back().shift = shift + 0.25 * static_cast<double>(pixel.place.size());
     }
 }
 
@@ -157,7 +162,8 @@ std::vector<std::optional<ReceiverPlace>> renderObjectPixels(const Camera& camer
     const int columns = (width + kTile - 1) / kTile;
     const int rows = (height + kTile - 1) / kTile;
     const Tracer tracer(camera, scene);
-    GlossPixels gloss(width, height);
+    std::vector<std::vector<ObjectPixel>> tiles(static_cast<std::size_t>(columns) *
+                                                static_cast<std::size_t>(rows));
     parallelFor(0, static_cast<std::int64_t>(columns) * rows, [&](std::int64_t tile) {
         if (progress.cancelled()) return;
         const int x0 = static_cast<int>(tile) % columns * kTile;
@@ -178,34 +184,39 @@ std::vector<std::optional<ReceiverPlace>> renderObjectPixels(const Camera& camer
                 listPlaces(seen, places);
                 pixels.push_back(std::move(seen));
             }
-        const auto received = shading.receive(places);
-        for (const PixelPoints& pixel : pixels) {
-            Gloss sum;
-            for (std::size_t i = 0; i < pixel.points.size(); ++i) {
-                const Gloss seen = shading.radiance(pixel.points[i],
-                                                    pixel.toward_camera[i],
-                                                    received[pixel.place[i]],
-                                                    LobeDraw::of(pixel.pixel, static_cast<int>(i)));
-                sum.sharp += seen.sharp;
-                sum.gathered += seen.gathered;
-                sum.reflectance += seen.reflectance;
-            }
-            const int x = pixel.pixel.x;
-            const int y = pixel.pixel.y;
-            const float share = pixel.alpha / static_cast<float>(pixel.points.size());
-            layers.alpha(x, y) = pixel.alpha;
-            layers.object(x, y) = sum.sharp * share;
-            const SurfacePoint& first = pixel.points.front();
-            gloss.gathered(x, y) = sum.gathered * share;
-            gloss.reflectance(x, y) = sum.reflectance * share;
-            gloss.normal(x, y) = glm::vec3(first.shading_normal);
-            gloss.roughness(x, y) = first.material.roughness;
-            gloss.depth_m(x, y) = static_cast<float>(first.distance_m);
-            gloss.object(x, y) = static_cast<std::uint32_t>(first.object);
+        const auto received = shading.receive(places, kRays);
+        for (const PixelPoints& seen : pixels) {
+            const auto count = static_cast<float>(seen.points.size());
+            const SurfacePoint& first = seen.points.front();
+            ObjectPixel sums;
+            sums.pixel = seen.pixel;
+            sums.normal = glm::vec3(first.shading_normal);
+            sums.depth_m = static_cast<float>(first.distance_m);
+            sums.roughness = first.material.roughness;
+            sums.object = static_cast<std::uint32_t>(first.object);
+            sums.one_place = seen.place.front() == seen.place.back();
+            Rgb radiance(0.0f);
+            for (std::size_t i = 0; i < seen.points.size(); ++i)
+                shading.add(seen.points[i],
+                            seen.toward_camera[i],
+                            received[seen.place[i]],
+                            LobeDraw::of(seen.pixel, static_cast<int>(i)),
+                            sums,
+                            radiance);
+            sums.rays = 1.0f / count * sums.rays;
+            const float share = seen.alpha / count;
+            for (Rgb* sum : {&sums.matt, &sums.matt_open, &sums.glossy, &sums.gathered})
+                *sum *= share;
+            layers.alpha(seen.pixel.x, seen.pixel.y) = seen.alpha;
+            layers.object(seen.pixel.x, seen.pixel.y) = radiance * share;
+            tiles[static_cast<std::size_t>(tile)].push_back(sums);
         }
     });
     progress.checkpoint();
-    addSmoothedGloss(gloss, layers.object);
+    std::vector<ObjectPixel> all;
+    for (const std::vector<ObjectPixel>& tile : tiles)
+        all.insert(all.end(), tile.begin(), tile.end());
+    addShared(all, layers.object);
     return receivers;
 }
 

@@ -65,20 +65,16 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
 
 std::vector<float> samplesSeen(const FivScene& scene, std::span<const ObjectSample> samples)
 {
-    const SilhouetteSet& set = scene.coarse.silhouettes;
-    const std::size_t pairs = scene.coarse.cells().pairCount();
-    std::vector<glm::vec3> local;
-    for (const ObjectSample& sample : samples)
-        local.push_back(scene.frame().localFrom(sample.point.position));
-    std::vector<float> seen(pairs * samples.size());
-    parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
+    const DirectionCells& cells = scene.coarse_cells->cells;
+    std::vector<float> seen(cells.pairCount() * samples.size());
+    parallelFor(0, static_cast<std::int64_t>(cells.pairCount()), [&](std::int64_t number) {
         const auto pair = static_cast<std::size_t>(number);
+        const glm::dvec3 direction = cells.direction(pair);
         for (std::size_t i = 0; i < samples.size(); ++i) {
-            const double cosine = glm::dot(samples[i].point.geometric_normal, set.directions[pair]);
-            const HiddenShares shares = hiddenShares(set, pair, local[i], 1.5f);
-            const double hidden = cosine > 0.0 ? shares.along : shares.against;
-            seen[pair * samples.size() + i] =
-                static_cast<float>(cosine * (1.0 - hidden) * samples[i].area);
+            const double cosine = glm::dot(samples[i].point.geometric_normal, direction);
+            const glm::dvec3 away = cosine > 0.0 ? direction : -direction;
+            if (!scene.objects.occluded(scene.objects.leave(samples[i].point, away), away))
+                seen[pair * samples.size() + i] = static_cast<float>(cosine * samples[i].area);
         }
     });
     return seen;
@@ -87,13 +83,13 @@ std::vector<float> samplesSeen(const FivScene& scene, std::span<const ObjectSamp
 void setGlow(FivScene& scene,
              std::span<const ObjectSample> samples,
              std::span<const float> seen,
-             std::span<const ObjectShading::Received> received)
+             std::span<const Rgb> irradiance)
 {
-    const std::size_t pairs = scene.coarse.cells().pairCount();
+    const std::size_t pairs = scene.coarse_cells->cells.pairCount();
     std::vector<Rgb> sent(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const SurfaceMaterial& m = samples[i].point.material;
-        sent[i] = m.emissive + evenReflectance(m) * (received[i].smooth + received[i].spots) / kPi;
+        sent[i] = m.emissive + evenReflectance(m) * irradiance[i] / kPi;
     }
     std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
     ObjectGlow near;

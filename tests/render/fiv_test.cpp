@@ -324,11 +324,10 @@ TEST(RenderFiv, ValidateNamesEveryMistake)
     options.fiv.object_face_size = 0;
     options.fiv.receiver_node_spacing_m = 0.0;
     options.fiv.object_node_spacing_m = -1.0;
-    options.fiv.bias_texels = -1.0f;
     options.fiv.interpolation_tolerance = -1.0;
     options.fiv.object_samples = 0;
     options.fiv.atlas.resolution = 1;
-    EXPECT_EQ(options.validate().size(), 7u);
+    EXPECT_EQ(options.validate().size(), 6u);
 }
 
 TEST(ObjectGlow, WeighsWhatIsNearByItsFormFactor)
