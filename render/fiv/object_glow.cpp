@@ -21,9 +21,9 @@ void ObjectGlow::add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb ra
     b.blue[lane] = radiance.b;
 }
 
-/// Weight, red, green and blue of the mean by form factors and of the one without distance.
 struct ObjectGlow::Sums {
-    std::array<Lanes, 4> near{}, all{};
+    Lanes form{}, red{}, green{}, blue{};
+    Lanes facing{};  ///< form factors times squared distances
 };
 
 // Lane by lane, so that the order of sums does not depend on a vector's width.
@@ -40,14 +40,11 @@ INSITU_KERNEL void ObjectGlow::sum(glm::vec3 x, glm::vec3 n, Sums& sums) const
             const float facing =
                 (here > 0.0f ? here : 0.0f) * (there > 0.0f ? there : 0.0f) * b.area[i] / square;
             const float form = facing / (square + b.area[i]);
-            sums.near[0][i] += form;
-            sums.near[1][i] += form * b.red[i];
-            sums.near[2][i] += form * b.green[i];
-            sums.near[3][i] += form * b.blue[i];
-            sums.all[0][i] += facing;
-            sums.all[1][i] += facing * b.red[i];
-            sums.all[2][i] += facing * b.green[i];
-            sums.all[3][i] += facing * b.blue[i];
+            sums.form[i] += form;
+            sums.red[i] += form * b.red[i];
+            sums.green[i] += form * b.green[i];
+            sums.blue[i] += form * b.blue[i];
+            sums.facing[i] += form * square;
         }
 }
 
@@ -63,12 +60,17 @@ INSITU_TARGET_AVX512 void ObjectGlow::sumAvx512(glm::vec3 x, glm::vec3 n, Sums& 
 }
 #endif
 
-Rgb ObjectGlow::excess(glm::dvec3 place, glm::dvec3 unit_normal) const
+ObjectGlow::Seen ObjectGlow::seenFrom(glm::dvec3 place,
+                                      glm::dvec3 unit_normal,
+                                      double radius_m) const
 {
-    return excess(bestInstructionSet(), place, unit_normal);
+    return seenFrom(bestInstructionSet(), place, unit_normal, radius_m);
 }
 
-Rgb ObjectGlow::excess(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const
+ObjectGlow::Seen ObjectGlow::seenFrom(InstructionSet isa,
+                                      glm::dvec3 place,
+                                      glm::dvec3 unit_normal,
+                                      double radius_m) const
 {
     const glm::vec3 x(place);
     const glm::vec3 n(unit_normal);
@@ -81,14 +83,12 @@ Rgb ObjectGlow::excess(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_nor
     else
 #endif
         sum(x, n, sums);
-    const auto mean = [](const std::array<Lanes, 4>& of) {
-        const auto total = [&](std::size_t k) {
-            return std::accumulate(of[k].begin(), of[k].end(), 0.0f);
-        };
-        const float weight = total(0);
-        return weight > 0.0f ? Rgb(total(1), total(2), total(3)) / weight : Rgb(0.0f);
-    };
-    return mean(sums.near) - mean(sums.all);
+    const auto total = [](const Lanes& of) { return std::accumulate(of.begin(), of.end(), 0.0f); };
+    const float form = total(sums.form);
+    if (!(form > 0.0f)) return {};
+    const auto radius2 = static_cast<float>(radius_m * radius_m);
+    return {Rgb(total(sums.red), total(sums.green), total(sums.blue)) / form,
+            radius2 / (radius2 + total(sums.facing) / form)};
 }
 
 }  // namespace insitu

@@ -18,12 +18,19 @@ public:
     /// A point's surface looks along its normal and stands for an area.
     void add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb radiance);
 
-    /// Mean radiance of the points that face the place and lie above its horizon, near ones
-    /// weighted as their form factor, less the mean without regard to distance: 0 far away. What
-    /// points hide each other from the place is not looked at.
-    [[nodiscard]] Rgb excess(glm::dvec3 place, glm::dvec3 unit_normal) const;
+    /// What a place close to the objects sees of them.
+    struct Seen {
+        Rgb radiance{0.0f};  ///< mean of the points that face the place and lie above its horizon,
+                             ///< each as its form factor
+        float nearness = 0.0f;  ///< 1 on the objects, 1/2 at their radius, 0 far away
+    };
+    /// What points hide each other from the place is not looked at. `radius_m`: of the objects.
+    [[nodiscard]] Seen seenFrom(glm::dvec3 place, glm::dvec3 unit_normal, double radius_m) const;
     /// The same by one of the processor's instruction sets, with the same bytes.
-    [[nodiscard]] Rgb excess(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const;
+    [[nodiscard]] Seen seenFrom(InstructionSet isa,
+                                glm::dvec3 place,
+                                glm::dvec3 unit_normal,
+                                double radius_m) const;
 
 private:
     static constexpr std::size_t kLanes = 16;

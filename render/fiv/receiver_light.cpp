@@ -130,9 +130,8 @@ void ReceiverLight::update(Node& node) const
         node.open = {without, change};
     }
     for (Look& look : node.looks) {
-        const Rgb glow = scene_.glowAlong(glm::dvec3(scene_.cells->directions[look.cell]));
         const Rgb change = look.end.lookUp(scene_.room_change);
-        look.loss = look.weight * (look.radiance + look.beyond * (change - glow));
+        look.loss = look.weight * (look.radiance + look.beyond * change);
     }
 }
 
@@ -176,14 +175,16 @@ std::vector<Rgb> ReceiverLight::hidden(const Square& square,
     CornerIrradiance light;
     light.along.resize(pairs);
     light.against.resize(pairs);
-    light.sky_along.resize(pairs, 0.0f);
-    light.sky_against.resize(pairs, 0.0f);
+    light.alike_along.resize(pairs);
+    light.alike_against.resize(pairs);
     for (std::size_t corner = 0; corner < 4; ++corner)
         for (const Look& look : nodes_[square.nodes[corner]].looks) {
             const bool along = look.cell % 2 == 0;
             (along ? light.along : light.against)[look.cell / 2][corner] = look.loss;
-            (along ? light.sky_along : light.sky_against)[look.cell / 2] +=
-                0.25f * look.weight * look.beyond;
+            const float sky = 0.25f * look.weight * look.beyond;
+            auto& alike = (along ? light.alike_along : light.alike_against)[look.cell / 2];
+            alike.sky += sky;
+            alike.sent += sky * scene_.glowAlong(glm::dvec3(scene_.cells->directions[look.cell]));
         }
     std::vector<glm::vec3> local(count);
     for (std::size_t i = 0; i < count; ++i)
@@ -192,9 +193,13 @@ std::vector<Rgb> ReceiverLight::hidden(const Square& square,
     hiddenIrradiance(scene_.atlas, light, local, square.weights, hidden);
     for (std::size_t i = 0; i < count; ++i) {
         const ReceiverPlace& place = places[square.places[i]];
-        lost[i] = hidden[i].light;
-        if (hidden[i].sky > kLeastSky)
-            lost[i] -= hidden[i].sky * scene_.near.excess(place.point, place.normal);
+        Rgb sent = hidden[i].sent;
+        if (hidden[i].sky > kLeastSky) {
+            const ObjectGlow::Seen seen =
+                scene_.near.seenFrom(place.point, place.normal, scene_.frame().radius);
+            sent = glm::mix(sent, hidden[i].sky * seen.radiance, seen.nearness);
+        }
+        lost[i] = hidden[i].light - sent;
     }
     return lost;
 }

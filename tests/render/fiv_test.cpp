@@ -1,7 +1,6 @@
 #include "core/parallel.h"
 #include "lighting/light_spots.h"
 #include "lighting/place_light.h"
-#include "render/fiv/object_glow.h"
 #include "render/renderer.h"
 #include "tests/render/insertion_rooms.h"
 #include "tests/support/shapes.h"
@@ -328,43 +327,6 @@ TEST(RenderFiv, ValidateNamesEveryMistake)
     options.fiv.object_samples = 0;
     options.fiv.atlas.resolution = 1;
     EXPECT_EQ(options.validate().size(), 6u);
-}
-
-TEST(ObjectGlow, WeighsWhatIsNearByItsFormFactor)
-{
-    const glm::dvec3 up(0.0, 1.0, 0.0);
-    ObjectGlow glow;
-    EXPECT_EQ(glow.excess(glm::dvec3(0.0), up), Rgb(0.0f));
-    glow.add({0.0, 0.1, 0.0}, -up, 0.01, Rgb(1.0f));
-    glow.add({0.0, 1.0, 0.0}, -up, 0.01, Rgb(5.0f));
-    // A surface that looks away, and one below the horizon.
-    glow.add({0.1, 0.5, 0.0}, up, 1.0, Rgb(100.0f));
-    glow.add({0.0, -0.2, 0.0}, up, 1.0, Rgb(100.0f));
-    // Area over squared distance (plus area) of both, against their plain mean, 3.
-    const double near = 0.01 / (0.01 + 0.01);
-    const double far = 0.01 / (1.0 + 0.01);
-    const double expected = (near + 5.0 * far) / (near + far) - 3.0;
-    EXPECT_NEAR(glow.excess(glm::dvec3(0.0), up).g, expected, 1e-5);
-    // Far away all points are as near as each other.
-    EXPECT_NEAR(glow.excess({0.0, -1000.0, 0.0}, up).g, 0.0, 0.01);
-}
-
-TEST(ObjectGlow, EveryInstructionSetGivesTheSameBytes)
-{
-    ObjectGlow glow;
-    for (int i = 0; i < 77; ++i) {
-        const glm::dvec3 p(std::sin(3.0 * i), 0.5 + 0.4 * std::cos(5.0 * i), std::sin(7.0 * i));
-        glow.add(
-            p, -glm::normalize(p), 0.01 + 0.001 * i, Rgb(0.1f * static_cast<float>(i), 1.0f, 0.5f));
-    }
-    const glm::dvec3 up(0.0, 1.0, 0.0);
-    for (const double x : {-0.5, 0.0, 0.7}) {
-        const Rgb base = glow.excess(InstructionSet::Base, {x, 0.0, 0.1}, up);
-        EXPECT_NE(base, Rgb(0.0f));
-        for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa)
-            EXPECT_EQ(glow.excess(static_cast<InstructionSet>(isa), {x, 0.0, 0.1}, up), base)
-                << isa;
-    }
 }
 
 TEST(PlaceLight, SeesTheFurnaceAndItsChange)
