@@ -22,6 +22,7 @@
 #include "lighting/hidden_light.h"
 #include "lighting/staged_objects.h"
 
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
@@ -156,6 +157,24 @@ void compareTables(report::Table& table,
                     truth,
                     {size.azimuths, size.polars, size.shells, size.first_radii, size.last_radii},
                     asked[i]);
+    }
+    // What is left is the blur of silhouettes' texels: of the brightest directions, or of half of
+    // all.
+    constexpr std::array<std::pair<std::size_t, int>, 2> kSharper = {{{256, 512}, {3072, 128}}};
+    for (const auto& [fine, resolution] : kSharper) {
+        const Stopwatch sharpening;
+        const ObjectLight sharp = litByTexels(stage, light, fine, {.resolution = resolution});
+        const double sharp_s = sharpening.passed().processor;
+        const Stopwatch watch;
+        const Picture picture = exactPicture(stage, sharp);
+        table.add({name,
+                   fmt::format(
+                       "ours, exact, {} at {}x{}", sharp.light.fine.size(), resolution, resolution),
+                   sharp_s,
+                   watch.passed().processor,
+                   static_cast<double>(sharp.fine.memoryBytes()) * 1e-6,
+                   nrmse(truth, picture),
+                   asked.front().exact});
     }
 }
 

@@ -37,7 +37,10 @@ inline TexelLight patches(const std::vector<Patch>& lights)
 
 /// Light as given by the texels of a cube, as in the thesis. Each is a point at its middle, so the
 /// `fine` brightest throw hard shadows of their own.
-inline ObjectLight litByTexels(const Stage& stage, const TexelLight& light, std::size_t fine)
+inline ObjectLight litByTexels(const Stage& stage,
+                               const TexelLight& light,
+                               std::size_t fine,
+                               const FineSilhouetteOptions& silhouettes = {})
 {
     CellLight cells = light.asCellLight();
     std::vector<std::size_t> order(light.radiance.size());
@@ -52,7 +55,7 @@ inline ObjectLight litByTexels(const Stage& stage, const TexelLight& light, std:
         cells.fine.push_back(v);
         v = {};
     }
-    return lightObject(stage.mesh, stage.atlas, std::move(cells), {}, silent);
+    return lightObject(stage.mesh, stage.atlas, std::move(cells), silhouettes, silent);
 }
 
 }  // namespace insitu::fiv_bench

@@ -52,26 +52,24 @@ Source sourceOf(const SilhouetteSet* set,
 Source sourceOfCorners(const SilhouetteSet& set, const CornerIrradiance& light)
 {
     using Corners = CornerIrradiance::Corners;
-    using Alike = CornerIrradiance::Alike;
     Source source;
     source.set = &set;
     source.shines.resize(light.along.size());
     const auto list =
-        [&](const std::vector<Corners>& from, const std::vector<Alike>& alike, unsigned bit) {
+        [&](const std::vector<Corners>& from, const std::vector<float>& sky, unsigned bit) {
             std::vector<float> flux;
             flux.reserve(from.size() * fluxNumbers(Sum::Corners));
             for (std::size_t i = 0; i < from.size(); ++i) {
                 for (const Rgb& corner : from[i])
                     flux.insert(flux.end(), {corner.r, corner.g, corner.b});
-                const auto& [sent, sky] = alike[i];
-                flux.insert(flux.end(), {sent.r, sent.g, sent.b, sky});
-                if (from[i] != Corners{} || sent != Rgb(0.0f) || sky != 0.0f)
+                flux.push_back(sky[i]);
+                if (from[i] != Corners{} || sky[i] != 0.0f)
                     source.shines[i] = static_cast<std::uint8_t>(source.shines[i] | bit);
             }
             return flux;
         };
-    source.along = list(light.along, light.alike_along, 1u);
-    source.against = list(light.against, light.alike_against, 2u);
+    source.along = list(light.along, light.sky_along, 1u);
+    source.against = list(light.against, light.sky_against, 2u);
     return source;
 }
 

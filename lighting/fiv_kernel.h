@@ -18,8 +18,8 @@ struct Block {
 
     alignas(64) Row x, y, z;     ///< local places; unused ones repeat the last
     alignas(64) Row nx, ny, nz;  ///< normals, where they are asked for
-    alignas(64) Row sums[16];    ///< what comes out, channel by channel
-    float uniform[16];           ///< the same for all places, to be added to the sums
+    alignas(64) Row sums[13];    ///< what comes out, channel by channel
+    float uniform[13];           ///< the same for all places, to be added to the sums
 };
 struct NormalBounds {
     glm::vec3 low{0.0f}, high{0.0f};
@@ -56,8 +56,8 @@ enum class Sum {
     Vectors,     ///< its irradiance vector: 9 sums, flux of 9 numbers a direction
     Irradiance,  ///< irradiance of one common normal: 3 sums, flux of 3 numbers a direction
     PerPlace,    ///< max(0, N·vector) with each place's own normal: 3 sums, flux of 9 numbers
-    /// Irradiance of one common normal in four lights: 12 sums, three of what is sent instead and
-    /// one for a sky of radiance 1, flux of as many numbers.
+    /// Irradiance of one common normal in four lights: 12 sums and one for a sky of radiance 1,
+    /// flux of as many numbers.
     Corners,
 };
 [[nodiscard]] constexpr int fluxNumbers(Sum sum)
@@ -66,7 +66,7 @@ enum class Sum {
         case Sum::Irradiance:
             return 3;
         case Sum::Corners:
-            return 16;
+            return 13;
         case Sum::Vectors:
         case Sum::PerPlace:
             break;

@@ -172,9 +172,7 @@ void hiddenIrradiance(const VisibilityAtlas& atlas,
               {},
               bias_texels,
               [&](const Block& block, std::size_t place, std::size_t i) {
-                  hidden[place] = {Rgb(0.0f),
-                                   fiv::irradianceOf(block, i, 12),
-                                   block.sums[15][i] + block.uniform[15]};
+                  hidden[place] = {Rgb(0.0f), block.sums[12][i] + block.uniform[12]};
                   for (std::size_t corner = 0; corner < 4; ++corner)
                       hidden[place].light +=
                           weights[place][corner] * fiv::irradianceOf(block, i, 3 * corner);

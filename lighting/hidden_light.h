@@ -68,22 +68,16 @@ void hiddenIrradiance(const ObjectLight& object,
 /// What objects hide from a place.
 struct HiddenIrradiance {
     Rgb light{0.0f};
-    Rgb sent{0.0f};    ///< of what the objects send instead
     float sky = 0.0f;  ///< of a sky of radiance 1: π times the form factor from place to objects
 };
 /// Irradiance that the cells of an atlas give surfaces of one normal, in four lights at once: those
 /// seen from the corners of a square of receivers, in which light is bilinear.
 struct CornerIrradiance {
     using Corners = std::array<Rgb, 4>;
-    /// Of the cells of side 0 and of side 1, one a pair; 0 below the horizon.
+    /// Of the cells of side 0 and of side 1, one a pair; 0 below the horizon. Negative where what
+    /// hides is brighter than what it hides.
     std::vector<Corners> along, against;
-    /// Seen from all corners alike: what hides sends this, and a sky of radiance 1 would give this
-    /// (cosine times solid angle).
-    struct Alike {
-        Rgb sent{0.0f};
-        float sky = 0.0f;
-    };
-    std::vector<Alike> alike_along, alike_against;
+    std::vector<float> sky_along, sky_against;  ///< cosine times solid angle, 0 below the horizon
 };
 /// Irradiance of the hidden light, the corners mixed by each place's weights. What a place does not
 /// see is the same for all four, so this costs little more than one of them.

@@ -104,7 +104,6 @@ FivScene makeScene(const RoomLight& room,
                    room.cellIrradiance(),
                    {},
                    {},
-                   {},
                    interreflection};
     result.table_seconds = secondsSince(start);
     result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
@@ -114,7 +113,6 @@ FivScene makeScene(const RoomLight& room,
     scene.spots = LightSpots(room, scene.frame().center, LightSpotOptions{});
     for (std::size_t i = 0; i < scene.room_change.size(); ++i)
         scene.room_change[i] = Rgb(0.0f);
-    scene.glow.assign(scene.coarse_cells->directions.size(), Rgb(0.0f));
     return scene;
 }
 
@@ -141,15 +139,14 @@ void lightEachOther(FivScene& scene,
         return irradiance;
     };
     scene.sent = SentLight(scene.objects, samples);
-    const std::vector<float> seen = samplesSeen(scene, samples);
     if (!scene.interreflection)
-        setGlow(scene, samples, seen, std::vector<Rgb>(samples.size(), Rgb(0.0f)));
+        setGlow(scene, samples, std::vector<Rgb>(samples.size(), Rgb(0.0f)));
     for (int round = 0; scene.interreflection && round < 3; ++round) {
         if (round == 2) {
             scene.room_change = roomChange(scene, receivers);
             shading.update();
         }
-        setGlow(scene, samples, seen, received());
+        setGlow(scene, samples, received());
         progress.checkpoint();
     }
     receivers.update();

@@ -24,20 +24,11 @@ struct FivScene {
     LightSpots spots;
     FivLight light = FivLight::Room;
     FaceGrid<Rgb> room_change;  ///< ΔL of the room's surfaces, on its cell grid
-    /// Mean radiance of the objects' surfaces that are seen along a direction: a value for each
-    /// cell of `coarse_cells`, number 2·pair + side as in PlaceLight. What hides light sends this
-    /// instead.
-    std::vector<Rgb> glow;
-    ObjectGlow near;  ///< what of that is different close to the objects
-    SentLight sent;   ///< and what they show themselves and each other
+    ObjectGlow glow;            ///< what the objects send to the room
+    SentLight sent;             ///< what they show themselves and each other
     bool interreflection = true;
 
     [[nodiscard]] const LocalFrame& frame() const { return atlas.silhouettes.local; }
-    [[nodiscard]] Rgb glowAlong(glm::dvec3 direction) const
-    {
-        const DirectedPair cell = coarse_cells->cells.cellAt(direction);
-        return glow[2 * cell.pair + static_cast<std::size_t>(cell.side)];
-    }
     /// The cells of one of the scene's atlases that the objects might hide from any place within
     /// `reach_m` of this one.
     [[nodiscard]] LookOptions limitsTowardObjects(glm::dvec3 place,

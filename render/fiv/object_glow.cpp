@@ -23,7 +23,6 @@ void ObjectGlow::add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb ra
 
 struct ObjectGlow::Sums {
     Lanes form{}, red{}, green{}, blue{};
-    Lanes facing{};  ///< form factors times squared distances
 };
 
 // Lane by lane, so that the order of sums does not depend on a vector's width.
@@ -44,7 +43,6 @@ INSITU_KERNEL void ObjectGlow::sum(glm::vec3 x, glm::vec3 n, Sums& sums) const
             sums.red[i] += form * b.red[i];
             sums.green[i] += form * b.green[i];
             sums.blue[i] += form * b.blue[i];
-            sums.facing[i] += form * square;
         }
 }
 
@@ -60,17 +58,12 @@ INSITU_TARGET_AVX512 void ObjectGlow::sumAvx512(glm::vec3 x, glm::vec3 n, Sums& 
 }
 #endif
 
-ObjectGlow::Seen ObjectGlow::seenFrom(glm::dvec3 place,
-                                      glm::dvec3 unit_normal,
-                                      double radius_m) const
+Rgb ObjectGlow::seenFrom(glm::dvec3 place, glm::dvec3 unit_normal) const
 {
-    return seenFrom(bestInstructionSet(), place, unit_normal, radius_m);
+    return seenFrom(bestInstructionSet(), place, unit_normal);
 }
 
-ObjectGlow::Seen ObjectGlow::seenFrom(InstructionSet isa,
-                                      glm::dvec3 place,
-                                      glm::dvec3 unit_normal,
-                                      double radius_m) const
+Rgb ObjectGlow::seenFrom(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const
 {
     const glm::vec3 x(place);
     const glm::vec3 n(unit_normal);
@@ -85,10 +78,8 @@ ObjectGlow::Seen ObjectGlow::seenFrom(InstructionSet isa,
         sum(x, n, sums);
     const auto total = [](const Lanes& of) { return std::accumulate(of.begin(), of.end(), 0.0f); };
     const float form = total(sums.form);
-    if (!(form > 0.0f)) return {};
-    const auto radius2 = static_cast<float>(radius_m * radius_m);
-    return {Rgb(total(sums.red), total(sums.green), total(sums.blue)) / form,
-            radius2 / (radius2 + total(sums.facing) / form)};
+    return form > 0.0f ? Rgb(total(sums.red), total(sums.green), total(sums.blue)) / form
+                       : Rgb(0.0f);
 }
 
 }  // namespace insitu

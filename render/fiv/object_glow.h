@@ -11,26 +11,18 @@
 
 namespace insitu {
 
-/// Radiance of points all over the objects, for places so close to them that the objects' mean
-/// radiance is not what they see: in the hollow of an armchair, on the floor under a seat.
+/// Radiance of points all over the objects, for places of the room: the floor under a seat sees
+/// others of them than the wall behind.
 class ObjectGlow {
 public:
     /// A point's surface looks along its normal and stands for an area.
     void add(glm::dvec3 position, glm::dvec3 normal, double area, Rgb radiance);
 
-    /// What a place close to the objects sees of them.
-    struct Seen {
-        Rgb radiance{0.0f};  ///< mean of the points that face the place and lie above its horizon,
-                             ///< each as its form factor
-        float nearness = 0.0f;  ///< 1 on the objects, 1/2 at their radius, 0 far away
-    };
-    /// What points hide each other from the place is not looked at. `radius_m`: of the objects.
-    [[nodiscard]] Seen seenFrom(glm::dvec3 place, glm::dvec3 unit_normal, double radius_m) const;
+    /// Mean radiance of the points that face the place and lie above its horizon, each as its form
+    /// factor; 0 where there is none. What points hide each other from the place is not looked at.
+    [[nodiscard]] Rgb seenFrom(glm::dvec3 place, glm::dvec3 unit_normal) const;
     /// The same by one of the processor's instruction sets, with the same bytes.
-    [[nodiscard]] Seen seenFrom(InstructionSet isa,
-                                glm::dvec3 place,
-                                glm::dvec3 unit_normal,
-                                double radius_m) const;
+    [[nodiscard]] Rgb seenFrom(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const;
 
 private:
     static constexpr std::size_t kLanes = 16;

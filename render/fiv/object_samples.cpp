@@ -63,60 +63,23 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
     return samples;
 }
 
-std::vector<float> samplesSeen(const FivScene& scene, std::span<const ObjectSample> samples)
-{
-    const DirectionCells& cells = scene.coarse_cells->cells;
-    std::vector<float> seen(cells.pairCount() * samples.size());
-    parallelFor(0, static_cast<std::int64_t>(cells.pairCount()), [&](std::int64_t number) {
-        const auto pair = static_cast<std::size_t>(number);
-        const glm::dvec3 direction = cells.direction(pair);
-        for (std::size_t i = 0; i < samples.size(); ++i) {
-            const double cosine = glm::dot(samples[i].point.geometric_normal, direction);
-            const glm::dvec3 away = cosine > 0.0 ? direction : -direction;
-            if (!scene.objects.occluded(scene.objects.leave(samples[i].point, away), away))
-                seen[pair * samples.size() + i] = static_cast<float>(cosine * samples[i].area);
-        }
-    });
-    return seen;
-}
-
 void setGlow(FivScene& scene,
              std::span<const ObjectSample> samples,
-             std::span<const float> seen,
              std::span<const Rgb> irradiance)
 {
-    const std::size_t pairs = scene.coarse_cells->cells.pairCount();
     std::vector<Rgb> sent(samples.size());
+    ObjectGlow glow;
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const SurfaceMaterial& m = samples[i].point.material;
         sent[i] = m.emissive + evenReflectance(m) * irradiance[i] / kPi;
-    }
-    std::vector<Rgb> glow(2 * pairs, Rgb(0.0f));
-    ObjectGlow near;
-    // What lies deep in a hollow, or inside, hardly shows to what is outside.
-    for (std::size_t i = 0; i < samples.size(); ++i)
-        near.add(samples[i].point.position,
+        // What lies deep in a hollow, or inside, hardly shows to what is outside.
+        glow.add(samples[i].point.position,
                  samples[i].point.geometric_normal,
                  samples[i].area * static_cast<double>(scene.sent.open(i)),
                  sent[i]);
-    scene.near = std::move(near);
-    scene.sent.update(sent);
-    parallelFor(0, static_cast<std::int64_t>(pairs), [&](std::int64_t number) {
-        const auto pair = static_cast<std::size_t>(number);
-        glm::dvec3 sums[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
-        double weights[2] = {0.0, 0.0};
-        for (std::size_t i = 0; i < samples.size(); ++i) {
-            const double weight = seen[pair * samples.size() + i];
-            // What faces ω is seen by those who look along −ω.
-            const int side = weight > 0.0 ? 1 : 0;
-            sums[side] += std::abs(weight) * glm::dvec3(sent[i]);
-            weights[side] += std::abs(weight);
-        }
-        for (int side = 0; side < 2; ++side)
-            if (weights[side] > 0.0)
-                glow[2 * pair + static_cast<std::size_t>(side)] = Rgb(sums[side] / weights[side]);
-    });
+    }
     scene.glow = std::move(glow);
+    scene.sent.update(sent);
 }
 
 }  // namespace insitu

@@ -21,9 +21,6 @@ constexpr int kRaysAlong = 2;
 /// Changes below this share of the irradiance are none.
 constexpr float kLeastChange = 1e-4f;
 
-/// Objects that hide less of a sky than this are too far away for their parts to matter.
-constexpr float kLeastSky = 0.01f;
-
 struct NodeGrid {
     int columns = 1;
     int rows = 1;
@@ -175,16 +172,14 @@ std::vector<Rgb> ReceiverLight::hidden(const Square& square,
     CornerIrradiance light;
     light.along.resize(pairs);
     light.against.resize(pairs);
-    light.alike_along.resize(pairs);
-    light.alike_against.resize(pairs);
+    light.sky_along.resize(pairs, 0.0f);
+    light.sky_against.resize(pairs, 0.0f);
     for (std::size_t corner = 0; corner < 4; ++corner)
         for (const Look& look : nodes_[square.nodes[corner]].looks) {
             const bool along = look.cell % 2 == 0;
             (along ? light.along : light.against)[look.cell / 2][corner] = look.loss;
-            const float sky = 0.25f * look.weight * look.beyond;
-            auto& alike = (along ? light.alike_along : light.alike_against)[look.cell / 2];
-            alike.sky += sky;
-            alike.sent += sky * scene_.glowAlong(glm::dvec3(scene_.cells->directions[look.cell]));
+            (along ? light.sky_along : light.sky_against)[look.cell / 2] +=
+                0.25f * look.weight * look.beyond;
         }
     std::vector<glm::vec3> local(count);
     for (std::size_t i = 0; i < count; ++i)
@@ -193,13 +188,9 @@ std::vector<Rgb> ReceiverLight::hidden(const Square& square,
     hiddenIrradiance(scene_.atlas, light, local, square.weights, hidden);
     for (std::size_t i = 0; i < count; ++i) {
         const ReceiverPlace& place = places[square.places[i]];
-        Rgb sent = hidden[i].sent;
-        if (hidden[i].sky > kLeastSky) {
-            const ObjectGlow::Seen seen =
-                scene_.near.seenFrom(place.point, place.normal, scene_.frame().radius);
-            sent = glm::mix(sent, hidden[i].sky * seen.radiance, seen.nearness);
-        }
-        lost[i] = hidden[i].light - sent;
+        lost[i] = hidden[i].light;
+        if (hidden[i].sky > 0.0f)
+            lost[i] -= hidden[i].sky * scene_.glow.seenFrom(place.point, place.normal);
     }
     return lost;
 }

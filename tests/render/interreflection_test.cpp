@@ -98,6 +98,47 @@ TEST_P(LeftOut, ObjectsAreBlackToAllButTheCamera)
     EXPECT_GE(white.no_interreflection_error.upper, white.no_interreflection_error.rms);
 }
 
+/// A box with a plate that glows, or does not, before its side to the right.
+ObjectScene boxWithGlowingSide(float emission)
+{
+    Material plate = shapes::lambert(glm::vec3(0.0f));
+    plate.emissive = glm::vec3(emission);
+    std::vector<ObjectScene::Object> objects;
+    objects.push_back({shapes::model(shapes::box({-0.25f, 0.0f, -0.25f}, {0.25f, 0.5f, 0.25f}),
+                                     shapes::lambert(glm::vec3(0.0f))),
+                       {}});
+    objects.push_back(
+        {shapes::model(shapes::box({0.25f, 0.01f, -0.24f}, {0.26f, 0.49f, 0.24f}), plate), {}});
+    return ObjectScene(std::move(objects));
+}
+
+// The floor before the front of a box faces none of its sides: what these send does not get there.
+TEST_P(LeftOut, ASideLightsNotTheFloorBeforeTheFront)
+{
+    RoomDescription room;
+    room.floors.push_back({});
+    const SceneProxy proxy(room);
+    const RoomLight light(proxy, uniform(1.0f), {0, 1, 0}, std::nullopt, coarse(), g_silent);
+    const Camera camera = Camera::lookAt({-0.05, 3.0, 0.31}, {-0.05, 0.0, 0.30}, 300.0, 24, 12);
+    const auto meanRatio = [&](float emission) {
+        const RenderLayers layers =
+            renderInsertion(
+                camera, light, boxWithGlowingSide(emission), optionsOf(GetParam()), g_silent)
+                .layers;
+        double sum = 0.0;
+        int count = 0;
+        for (std::size_t i = 0; i < layers.alpha.pixelCount(); ++i) {
+            if (layers.alpha.pixels()[i] > 0.0f) continue;
+            sum += layers.irradiance_with.pixels()[i].g / layers.irradiance_without.pixels()[i].g;
+            ++count;
+        }
+        EXPECT_GT(count, 100);
+        return sum / count;
+    };
+    const double dark = meanRatio(0.0f);
+    EXPECT_NEAR(meanRatio(4.0f), dark, 0.0015);
+}
+
 std::string nameOf(const testing::TestParamInfo<Technique>& info)
 {
     return info.param == Technique::Fiv ? "Fiv" : "Reference";
