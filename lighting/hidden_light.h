@@ -74,8 +74,8 @@ struct HiddenIrradiance {
 /// seen from the corners of a square of receivers, in which light is bilinear.
 struct CornerIrradiance {
     using Corners = std::array<Rgb, 4>;
-    /// Of the cells of side 0 and of side 1, one a pair; 0 below the horizon. Negative where what
-    /// hides is brighter than what it hides.
+    /// Of the cells of side 0 and of side 1, one a pair; 0 below the horizon. May be negative,
+    /// where the room lost more than was there.
     std::vector<Corners> along, against;
     std::vector<float> sky_along, sky_against;  ///< cosine times solid angle, 0 below the horizon
 };
