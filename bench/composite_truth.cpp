@@ -271,22 +271,18 @@ void printRest(const InsertResult& result, const Touched& change)
 }
 
 struct Technique {
-    std::string name;
-    insitu::Technique technique = insitu::Technique::Reference;
+    insitu::Technique technique = insitu::Technique::Fiv;
     FivLight light = FivLight::Room;
     bool interreflection = true;
 };
-
-Technique techniqueOf(const std::string& name)
-{
-    Technique found{.name = name};
-    if (!name.starts_with("reference")) found.technique = insitu::Technique::Fiv;
-    if (name == "auto") found.technique = insitu::Technique::Auto;
-    if (name == "fiv-distant") found.light = FivLight::Distant;
-    if (name == "fiv-cube") found.light = FivLight::Cube;
-    found.interreflection = !name.ends_with("-direct");
-    return found;
-}
+const std::map<std::string, Technique> kTechniques{
+    {"reference", {.technique = insitu::Technique::Reference}},
+    {"reference-direct", {.technique = insitu::Technique::Reference, .interreflection = false}},
+    {"fiv", {}},
+    {"fiv-direct", {.interreflection = false}},
+    {"fiv-distant", {.light = FivLight::Distant}},
+    {"fiv-cube", {.light = FivLight::Cube}},
+    {"auto", {.technique = insitu::Technique::Auto}}};
 
 struct Arguments {
     InsertOptions options;
@@ -315,7 +311,7 @@ void measure(std::filesystem::path folder, const Arguments& arguments)
             if (!with_exif && !arguments.both) continue;
             InsertOptions options = arguments.options;
             options.use_exif_focal = with_exif;
-            const Technique technique = techniqueOf(name);
+            const Technique& technique = kTechniques.at(name);
             options.render.technique = technique.technique;
             options.render.fiv.light = technique.light;
             options.render.interreflection.enabled = technique.interreflection;
@@ -367,13 +363,7 @@ int main(int argc, char** argv)
         ->delimiter(',')
         ->check(CLI::IsMember(insitu::kMatchParts));
     app.add_option("--technique", arguments.techniques, "One or several")
-        ->check(CLI::IsMember({"reference",
-                               "reference-direct",
-                               "fiv",
-                               "fiv-direct",
-                               "auto",
-                               "fiv-distant",
-                               "fiv-cube"}))
+        ->check(CLI::IsMember(insitu::kTechniques))
         ->capture_default_str();
     app.add_option("--max-error", options.render.target_error, "As in insert")
         ->check(CLI::NonNegativeNumber)

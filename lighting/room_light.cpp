@@ -248,8 +248,14 @@ Rgb RoomLight::clippedOf(const Arrival& arrival, glm::dvec3 direction) const
 
 IncidentLight RoomLight::incident(glm::dvec3 x, glm::dvec3 direction) const
 {
+    const DrawnArrival drawn = arriveWithPdf(x, direction);
+    return {drawn.arrival.radiance, drawn.arrival.distance_m, drawn.pdf};
+}
+
+RoomLight::DrawnArrival RoomLight::arriveWithPdf(glm::dvec3 x, glm::dvec3 direction) const
+{
     const Arrival arrival = arrive(x, direction);
-    return {arrival.radiance, arrival.distance_m, pdf(arrival, direction)};
+    return {direction, arrival, pdf(arrival, direction)};
 }
 
 std::optional<LightSample> RoomLight::sample(glm::dvec3 x, double selector, glm::vec2 u) const

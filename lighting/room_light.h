@@ -87,14 +87,14 @@ public:
         std::optional<ProxyHit> hit;  ///< nothing: far away
     };
     [[nodiscard]] Arrival arrive(glm::dvec3 x, glm::dvec3 direction) const;
-    /// Density with which draw() would have drawn the direction of this arrival.
-    [[nodiscard]] double pdf(const Arrival& arrival, glm::dvec3 direction) const;
-    /// The same as sample(), with what was hit.
+    /// With the density with which draw() draws that direction.
     struct DrawnArrival {
         glm::dvec3 direction{0.0};
         Arrival arrival;
         double pdf = 0.0;
     };
+    [[nodiscard]] DrawnArrival arriveWithPdf(glm::dvec3 x, glm::dvec3 direction) const;
+    /// The same as sample(), with what was hit.
     [[nodiscard]] std::optional<DrawnArrival> draw(glm::dvec3 x,
                                                    double selector,
                                                    glm::vec2 u) const;
@@ -154,6 +154,7 @@ private:
     [[nodiscard]] double texelArea(std::size_t face) const;
     [[nodiscard]] double texelPdf(std::size_t face, glm::dvec2 uv) const;
     [[nodiscard]] double outsidePdf(glm::dvec3 direction) const;
+    [[nodiscard]] double pdf(const Arrival& arrival, glm::dvec3 direction) const;
     [[nodiscard]] std::uint8_t outsideBand(glm::dvec3 direction) const;
     /// By how much a cell's irradiance would fall or rise were solid boxes not there.
     struct Doubt {

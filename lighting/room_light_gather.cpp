@@ -100,7 +100,8 @@ glm::dvec3 RoomLight::irradianceOver(std::span<const glm::dvec3> places,
     // [Veach97, 9.2].
     glm::dvec3 sum(0.0);
     const glm::dmat3 frame = frameFromNormal(normal);
-    const auto add = [&](glm::dvec3 direction, const Arrival& arrival, double density) {
+    const auto add = [&](const DrawnArrival& drawn) {
+        const auto& [direction, arrival, density] = drawn;
         const double cosine = glm::dot(direction, normal);
         if (cosine <= 0.0) return;
         const double weight = cosine / (cosine / pi + density) / options.rays_per_cell;
@@ -125,11 +126,9 @@ glm::dvec3 RoomLight::irradianceOver(std::span<const glm::dvec3> places,
         if (s < strata * strata)
             u = (u + glm::vec2(s % strata, s / strata)) / static_cast<float>(strata);
         const glm::dvec3 direction = frame * cosineHemisphere(u);
-        const Arrival arrival = arrive(x, direction);
-        add(direction, arrival, pdf(arrival, direction));
+        add(arriveWithPdf(x, direction));
         const double selector = random.uniformDouble();
-        if (const auto drawn = draw(x, selector, random.uniform2()))
-            add(drawn->direction, drawn->arrival, drawn->pdf);
+        if (const auto drawn = draw(x, selector, random.uniform2())) add(*drawn);
     }
     // What is clipped by itself, systematically: it may become a thousand times as strong, and so
     // would its noise.

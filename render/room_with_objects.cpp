@@ -95,10 +95,10 @@ std::optional<LightSample> RoomWithObjects::sample(glm::dvec3 x, double selector
 
 IncidentLight RoomWithObjects::incident(glm::dvec3 x, glm::dvec3 direction) const
 {
-    const RoomLight::Arrival arrival = room_.arrive(x, direction);
-    return {glm::max(arrival.radiance + change(arrival), Rgb(0.0f)),
-            arrival.distance_m,
-            room_.pdf(arrival, direction)};
+    const RoomLight::DrawnArrival drawn = room_.arriveWithPdf(x, direction);
+    return {glm::max(drawn.arrival.radiance + change(drawn.arrival), Rgb(0.0f)),
+            drawn.arrival.distance_m,
+            drawn.pdf};
 }
 
 RoomWithObjects::Cones RoomWithObjects::conesFrom(glm::dvec3 x) const
@@ -116,14 +116,13 @@ RoomWithObjects::Cones RoomWithObjects::conesFrom(glm::dvec3 x) const
 
 void RoomWithObjects::addDirection(glm::dvec3 x,
                                    glm::dvec3 normal,
-                                   glm::dvec3 direction,
-                                   const RoomLight::Arrival& arrival,
-                                   double light_pdf,
+                                   const RoomLight::DrawnArrival& drawn,
                                    const Cones& cones,
                                    const PathOptions& path,
                                    RandomStream& random,
                                    ReceiverSample& sum) const
 {
+    const auto& [direction, arrival, light_pdf] = drawn;
     const double cosine = glm::dot(direction, normal);
     if (cosine <= 0.0) return;
     // Balance heuristic over the three strategies, one draw each.
@@ -152,24 +151,19 @@ ReceiverSample RoomWithObjects::sampleReceiver(glm::dvec3 x,
     const Cones cones = conesFrom(x);
 
     const glm::dvec3 by_cosine = frameFromNormal(normal) * cosineHemisphere(random.uniform2());
-    const auto add = [&](glm::dvec3 direction) {
-        const RoomLight::Arrival arrival = room_.arrive(x, direction);
-        const double density = room_.pdf(arrival, direction);
-        addDirection(x, normal, direction, arrival, density, cones, path, random, sum);
-    };
-    add(by_cosine);
+    addDirection(x, normal, room_.arriveWithPdf(x, by_cosine), cones, path, random, sum);
 
     const double selector = random.uniformDouble();
     if (const auto drawn = room_.draw(x, selector, random.uniform2()))
-        addDirection(
-            x, normal, drawn->direction, drawn->arrival, drawn->pdf, cones, path, random, sum);
+        addDirection(x, normal, *drawn, cones, path, random, sum);
 
     if (cones.count > 0) {
         const Cones::Cone& cone =
             cones.cones[random.below(static_cast<std::uint32_t>(cones.count))];
         const glm::dvec3 by_cone =
             frameFromNormal(cone.axis) * uniformCone(random.uniform2(), cone.cos_half_angle);
-        if (glm::dot(by_cone, normal) > 0.0) add(by_cone);
+        if (glm::dot(by_cone, normal) > 0.0)
+            addDirection(x, normal, room_.arriveWithPdf(x, by_cone), cones, path, random, sum);
     }
     return sum;
 }

@@ -69,9 +69,7 @@ private:
     [[nodiscard]] Rgb change(const RoomLight::Arrival& arrival) const;
     void addDirection(glm::dvec3 x,
                       glm::dvec3 normal,
-                      glm::dvec3 direction,
-                      const RoomLight::Arrival& arrival,
-                      double light_pdf,
+                      const RoomLight::DrawnArrival& drawn,
                       const Cones& cones,
                       const PathOptions& path,
                       RandomStream& random,

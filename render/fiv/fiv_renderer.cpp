@@ -103,7 +103,6 @@ FivScene makeScene(const RoomLight& room,
                    fiv.light,
                    room.cellIrradiance(),
                    {},
-                   {},
                    interreflection};
     result.table_seconds = secondsSince(start);
     result.table_processor_seconds = static_cast<double>(std::clock() - worked) / CLOCKS_PER_SEC;
@@ -132,21 +131,21 @@ void lightEachOther(FivScene& scene,
         places.back().normal = sample.point.geometric_normal;
         places.back().shift = r2Point(static_cast<double>(places.size()));
     }
-    const auto received = [&] {
-        std::vector<Rgb> irradiance;
-        for (const ObjectShading::Received& r : shading.receive(places, kSampleRays))
-            irradiance.push_back(r.smooth() + r.spots);
-        return irradiance;
-    };
     scene.sent = SentLight(scene.objects, samples);
-    if (!scene.interreflection)
-        setGlow(scene, samples, std::vector<Rgb>(samples.size(), Rgb(0.0f)));
-    for (int round = 0; scene.interreflection && round < 3; ++round) {
+    std::vector<Rgb> irradiance(samples.size(), Rgb(0.0f));
+    if (!scene.interreflection) {
+        setSent(scene, samples, irradiance);
+        return;
+    }
+    for (int round = 0; round < 3; ++round) {
         if (round == 2) {
             scene.room_change = roomChange(scene, receivers);
             shading.update();
         }
-        setGlow(scene, samples, received());
+        const auto received = shading.receive(places, kSampleRays);
+        for (std::size_t i = 0; i < received.size(); ++i)
+            irradiance[i] = received[i].smooth() + received[i].spots;
+        setSent(scene, samples, irradiance);
         progress.checkpoint();
     }
     receivers.update();

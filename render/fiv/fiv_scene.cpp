@@ -5,16 +5,14 @@
 
 namespace insitu {
 
-LookOptions FivScene::limitsTowardObjects(glm::dvec3 place,
-                                          double reach_m,
-                                          const VisibilityAtlas& of) const
+LookOptions FivScene::limitsTowardObjects(glm::dvec3 place, double reach_m) const
 {
     const glm::dvec3 way = frame().center - place;
     const double distance = glm::length(way);
     const double sine = (frame().radius + reach_m) / distance;
     if (!(sine < 1.0)) return {};
     // From a cell's centre to its corner, and a little more.
-    const double angle = std::asin(sine) + 1.5 / of.options.face_size;
+    const double angle = std::asin(sine) + 1.5 / atlas.options.face_size;
     if (angle >= std::numbers::pi) return {};
     LookOptions limits;
     limits.axis = glm::vec3(way / distance);

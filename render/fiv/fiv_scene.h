@@ -4,7 +4,6 @@
 #include "lighting/light_spots.h"
 #include "lighting/place_light.h"
 #include "lighting/visibility_atlas.h"
-#include "render/fiv/object_glow.h"
 #include "render/fiv/sent_light.h"
 #include "render/object_scene.h"
 #include "render/renderer.h"
@@ -20,20 +19,16 @@ struct FivScene {
     const ObjectScene& objects;
     VisibilityAtlas atlas;                             ///< what receivers lose
     std::shared_ptr<const CellGeometry> cells;         ///< of `atlas`
-    std::shared_ptr<const CellGeometry> coarse_cells;  ///< fewer, for the objects' own light
+    std::shared_ptr<const CellGeometry> coarse_cells;  ///< fewer, for what nothing hides
     LightSpots spots;
     FivLight light = FivLight::Room;
     FaceGrid<Rgb> room_change;  ///< ΔL of the room's surfaces, on its cell grid
-    ObjectGlow glow;            ///< what the objects send to the room
-    SentLight sent;             ///< what they show themselves and each other
+    SentLight sent;             ///< by the objects, to the room, themselves and each other
     bool interreflection = true;
 
     [[nodiscard]] const LocalFrame& frame() const { return atlas.silhouettes.local; }
-    /// The cells of one of the scene's atlases that the objects might hide from any place within
-    /// `reach_m` of this one.
-    [[nodiscard]] LookOptions limitsTowardObjects(glm::dvec3 place,
-                                                  double reach_m,
-                                                  const VisibilityAtlas& of) const;
+    /// The atlas's cells that the objects might hide from any place within `reach_m` of this one.
+    [[nodiscard]] LookOptions limitsTowardObjects(glm::dvec3 place, double reach_m) const;
     /// How far the objects' box lies ahead at least, for rays along this unit direction that pass
     /// anywhere through it; negative when it reaches behind the place.
     [[nodiscard]] double distanceToObjects(glm::dvec3 place, glm::dvec3 direction) const

@@ -17,7 +17,6 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaxNodesAlong = 6;
 constexpr int kIrradianceCube = 16;
-constexpr double kGoldenRatio = 0.6180339887498949;
 /// Rays along a cell's side from the nodes: at the edges of windows the light of a cell is mixed.
 constexpr int kNodeRaysAlong = 3;
 
@@ -127,13 +126,18 @@ Rgb ObjectShading::openIrradiance(const Place& place) const
     return sum;
 }
 
-Rgb ObjectShading::spotIrradiance(const Place& place) const
+glm::dvec3 ObjectShading::startOfRays(const Place& place) const
 {
-    glm::dvec3 sum(0.0);
     SurfacePoint point;
     point.position = place.position;
     point.geometric_normal = place.geometric_normal;
-    const glm::dvec3 start = scene_.objects.leave(point, place.geometric_normal);
+    return scene_.objects.leave(point, place.geometric_normal);
+}
+
+Rgb ObjectShading::spotIrradiance(const Place& place) const
+{
+    glm::dvec3 sum(0.0);
+    const glm::dvec3 start = startOfRays(place);
     for (const LightSpot& spot : scene_.spots.spots()) {
         const glm::dvec3 toward = spot.far ? spot.at : spot.at - start;
         if (glm::dot(toward, place.normal) <= 0.0 ||
@@ -151,16 +155,14 @@ Rgb ObjectShading::spotIrradiance(const Place& place) const
 
 RayLight ObjectShading::rayLight(const Place& place, int rays) const
 {
-    SurfacePoint point;
-    point.position = place.position;
-    point.geometric_normal = place.geometric_normal;
-    const glm::dvec3 start = scene_.objects.leave(point, place.geometric_normal);
+    const glm::dvec3 start = startOfRays(place);
     const glm::dvec3 from = scene_.light == FivLight::Room ? start : scene_.frame().center;
     const glm::dmat3 to_world = frameFromNormal(place.normal);
     const int draws = rays / 2;
     RayLight light;
     // Cosine and light sampling joined by the balance heuristic [Veach97, 9.2].
-    const auto add = [&](glm::dvec3 direction, const RoomLight::Arrival& arrival, double density) {
+    const auto add = [&](const RoomLight::DrawnArrival& drawn) {
+        const auto& [direction, arrival, density] = drawn;
         const double cosine = glm::dot(direction, place.normal);
         // What is below the surface only by its own curvature tells nothing of what lies near.
         if (cosine <= 0.0 || glm::dot(direction, place.geometric_normal) <= 0.0) return;
@@ -179,13 +181,10 @@ RayLight ObjectShading::rayLight(const Place& place, int rays) const
     };
     for (int i = 0; i < draws; ++i) {
         const glm::dvec2 u = r2Point(i, place.shift);
-        const glm::dvec3 direction = to_world * cosineHemisphere(u);
-        const RoomLight::Arrival arrival = scene_.room.arrive(from, direction);
-        add(direction, arrival, scene_.room.pdf(arrival, direction));
+        add(scene_.room.arriveWithPdf(from, to_world * cosineHemisphere(u)));
         // Which light is drawn matters more than where on it: evenly by itself.
-        const double selector = glm::fract(place.shift.x + i * kGoldenRatio);
-        if (const auto drawn = scene_.room.draw(from, selector, u))
-            add(drawn->direction, drawn->arrival, drawn->pdf);
+        const double selector = glm::fract(place.shift.x + i * std::numbers::phi);
+        if (const auto drawn = scene_.room.draw(from, selector, u)) add(*drawn);
     }
     return light;
 }

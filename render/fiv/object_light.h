@@ -55,6 +55,7 @@ public:
 private:
     void lookFromNodes(double spacing_m);
     [[nodiscard]] Rgb openIrradiance(const Place& place) const;
+    [[nodiscard]] glm::dvec3 startOfRays(const Place& place) const;
     [[nodiscard]] Rgb spotIrradiance(const Place& place) const;
     [[nodiscard]] RayLight rayLight(const Place& place, int rays) const;
 

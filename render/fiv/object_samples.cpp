@@ -1,6 +1,5 @@
 #include "render/fiv/object_samples.h"
 
-#include "core/parallel.h"
 #include "lighting/sampling.h"
 
 #include <algorithm>
@@ -63,22 +62,15 @@ std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count)
     return samples;
 }
 
-void setGlow(FivScene& scene,
+void setSent(FivScene& scene,
              std::span<const ObjectSample> samples,
              std::span<const Rgb> irradiance)
 {
     std::vector<Rgb> sent(samples.size());
-    ObjectGlow glow;
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const SurfaceMaterial& m = samples[i].point.material;
         sent[i] = m.emissive + evenReflectance(m) * irradiance[i] / kPi;
-        // What lies deep in a hollow, or inside, hardly shows to what is outside.
-        glow.add(samples[i].point.position,
-                 samples[i].point.geometric_normal,
-                 samples[i].area * static_cast<double>(scene.sent.open(i)),
-                 sent[i]);
     }
-    scene.glow = std::move(glow);
     scene.sent.update(sent);
 }
 

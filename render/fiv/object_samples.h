@@ -14,8 +14,8 @@ struct ObjectSample {
 };
 [[nodiscard]] std::vector<ObjectSample> sampleObjects(const ObjectScene& objects, int count);
 
-/// Sets what the objects send (FivScene::glow, sent) when their samples receive this irradiance.
-void setGlow(FivScene& scene,
+/// Sets what the objects send (FivScene::sent) when their samples receive this irradiance.
+void setSent(FivScene& scene,
              std::span<const ObjectSample> samples,
              std::span<const Rgb> irradiance);
 

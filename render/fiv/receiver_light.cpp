@@ -86,7 +86,7 @@ void ReceiverLight::lookTowardObjects(Node& node, int rays_along) const
 {
     node.rays_along = rays_along;
     node.looks.clear();
-    LookOptions limits = scene_.limitsTowardObjects(node.position, node.reach_m, scene_.atlas);
+    LookOptions limits = scene_.limitsTowardObjects(node.position, node.reach_m);
     limits.horizon_normal = glm::vec3(node.normal);
     const CellGeometry& cells = *scene_.cells;
     for (std::uint32_t cell = 0; cell < cells.directions.size(); ++cell) {
@@ -190,7 +190,7 @@ std::vector<Rgb> ReceiverLight::hidden(const Square& square,
         const ReceiverPlace& place = places[square.places[i]];
         lost[i] = hidden[i].light;
         if (hidden[i].sky > 0.0f)
-            lost[i] -= hidden[i].sky * scene_.glow.seenFrom(place.point, place.normal);
+            lost[i] -= hidden[i].sky * scene_.sent.seenFrom(place.point, place.normal);
     }
     return lost;
 }

@@ -41,7 +41,7 @@ class ReceiverLight {
 public:
     ReceiverLight(const FivScene& scene, double node_spacing_m);
 
-    /// To be called when the scene's glow or room_change has changed.
+    /// To be called when the scene's room_change has changed.
     void update();
     /// The smooth light of directions' cells. Nodes are made as they are needed and kept.
     [[nodiscard]] std::vector<ReceiverIrradiance> cells(std::span<const ReceiverPlace> places);

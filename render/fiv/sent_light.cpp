@@ -4,6 +4,7 @@
 #include "lighting/sampling.h"
 #include "render/fiv/object_samples.h"
 
+#include <numbers>
 #include <numeric>
 
 namespace insitu {
@@ -40,11 +41,12 @@ SentLight::SentLight(const ObjectScene& objects, std::span<const ObjectSample> s
         int met = 0;
         for (int k = 0; k < kRays; ++k) {
             // Begun elsewhere at each sample.
-            const glm::dvec2 begin(0.6180339887498949 * static_cast<double>(i));
+            const glm::dvec2 begin(std::numbers::phi * static_cast<double>(i));
             const glm::dvec3 direction = to_world * cosineHemisphere(r2Point(k, begin));
             met += objects.occluded(start, direction) ? 1 : 0;
         }
         open_[i] = 1.0f - static_cast<float>(met) / static_cast<float>(kRays);
+        bundles_[i / kLanes].open_area[i % kLanes] = static_cast<float>(samples[i].area) * open_[i];
     });
 }
 
@@ -60,18 +62,27 @@ void SentLight::update(std::span<const Rgb> sent)
 }
 
 // Lane by lane, so that the order of sums does not depend on a vector's width.
+template <SentLight::Weighing kWeighing>
 INSITU_KERNEL void SentLight::sum(glm::vec3 x, glm::vec3 n, Sums& sums) const
 {
     for (const Bundle& b : bundles_)
         for (std::size_t i = 0; i < kLanes; ++i) {
-            const float alike = b.normal_x[i] * n.x + b.normal_y[i] * n.y + b.normal_z[i] * n.z;
-            const float facing = alike > 0.0f ? alike : 0.0f;
             const float dx = b.x[i] - x.x;
             const float dy = b.y[i] - x.y;
             const float dz = b.z[i] - x.z;
-            const float spread = dx * dx + dy * dy + dz * dz + spacing2_;
-            const float share = facing / spread;
-            const float weight = share * share;
+            float weight = 0.0f;
+            if constexpr (kWeighing == Weighing::Alike) {
+                const float alike = b.normal_x[i] * n.x + b.normal_y[i] * n.y + b.normal_z[i] * n.z;
+                const float share =
+                    (alike > 0.0f ? alike : 0.0f) / (dx * dx + dy * dy + dz * dz + spacing2_);
+                weight = share * share;
+            } else {
+                const float here = dx * n.x + dy * n.y + dz * n.z;
+                const float there = -(dx * b.normal_x[i] + dy * b.normal_y[i] + dz * b.normal_z[i]);
+                const float square = dx * dx + dy * dy + dz * dz + 1e-12f;
+                weight = (here > 0.0f ? here : 0.0f) * (there > 0.0f ? there : 0.0f) *
+                         b.open_area[i] / (square * (square + b.open_area[i]));
+            }
             sums[0][i] += weight;
             sums[1][i] += weight * b.red[i];
             sums[2][i] += weight * b.green[i];
@@ -80,40 +91,48 @@ INSITU_KERNEL void SentLight::sum(glm::vec3 x, glm::vec3 n, Sums& sums) const
 }
 
 #if defined(__x86_64__)
+template <SentLight::Weighing kWeighing>
 INSITU_TARGET_AVX2 void SentLight::sumAvx2(glm::vec3 x, glm::vec3 n, Sums& sums) const
 {
-    sum(x, n, sums);
+    sum<kWeighing>(x, n, sums);
 }
 
+template <SentLight::Weighing kWeighing>
 INSITU_TARGET_AVX512 void SentLight::sumAvx512(glm::vec3 x, glm::vec3 n, Sums& sums) const
 {
-    sum(x, n, sums);
+    sum<kWeighing>(x, n, sums);
 }
 #endif
 
-Rgb SentLight::at(glm::dvec3 place, glm::dvec3 unit_normal) const
-{
-    return at(bestInstructionSet(), place, unit_normal);
-}
-
-Rgb SentLight::at(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const
+template <SentLight::Weighing kWeighing>
+Rgb SentLight::mean(InstructionSet isa, glm::dvec3 place, glm::dvec3 unit_normal) const
 {
     const glm::vec3 x(place);
     const glm::vec3 n(unit_normal);
     Sums sums{};
 #if defined(__x86_64__)
     if (isa == InstructionSet::Avx512)
-        sumAvx512(x, n, sums);
+        sumAvx512<kWeighing>(x, n, sums);
     else if (isa == InstructionSet::Avx2)
-        sumAvx2(x, n, sums);
+        sumAvx2<kWeighing>(x, n, sums);
     else
 #endif
-        sum(x, n, sums);
+        sum<kWeighing>(x, n, sums);
     const auto total = [&](std::size_t k) {
         return std::accumulate(sums[k].begin(), sums[k].end(), 0.0f);
     };
     const float weight = total(0);
     return weight > 0.0f ? Rgb(total(1), total(2), total(3)) / weight : Rgb(0.0f);
+}
+
+Rgb SentLight::at(glm::dvec3 place, glm::dvec3 unit_normal, InstructionSet isa) const
+{
+    return mean<Weighing::Alike>(isa, place, unit_normal);
+}
+
+Rgb SentLight::seenFrom(glm::dvec3 place, glm::dvec3 unit_normal, InstructionSet isa) const
+{
+    return mean<Weighing::FormFactor>(isa, place, unit_normal);
 }
 
 }  // namespace insitu

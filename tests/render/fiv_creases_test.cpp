@@ -51,8 +51,7 @@ TEST(FivCreases, ASlotThinnerThanATexelIsDark)
     double bottom = 0.0;
     for (const int x : {31, 32})
         bottom += 0.5 * received(x);
-    // Low rays along the slot meet its walls beyond the short rays' reach.
-    EXPECT_NEAR(bottom, closed_form, 0.1);
+    EXPECT_NEAR(bottom, closed_form, 0.05);
     for (const int x : {3, 10, 54, 60})
         EXPECT_NEAR(received(x), 1.0, 0.02) << "nothing is near the flat top";
 }

@@ -1,5 +1,4 @@
 #include "render/fiv/irradiance_cube.h"
-#include "render/fiv/object_glow.h"
 #include "render/fiv/object_samples.h"
 #include "render/fiv/object_sharing.h"
 #include "render/fiv/sent_light.h"
@@ -17,43 +16,7 @@ namespace {
 
 using std::numbers::pi;
 
-TEST(ObjectGlow, WeighsWhatFacesAPlaceByItsFormFactor)
-{
-    const glm::dvec3 up(0.0, 1.0, 0.0);
-    ObjectGlow glow;
-    EXPECT_EQ(glow.seenFrom(glm::dvec3(0.0), up), Rgb(0.0f));
-    glow.add({0.0, 0.1, 0.0}, -up, 0.01, Rgb(1.0f));
-    glow.add({0.0, 1.0, 0.0}, -up, 0.01, Rgb(5.0f));
-    // A surface that looks away, and one below the horizon.
-    glow.add({0.1, 0.5, 0.0}, up, 1.0, Rgb(100.0f));
-    glow.add({0.0, -0.2, 0.0}, up, 1.0, Rgb(100.0f));
-    // Area over squared distance (plus area).
-    const double near = 0.01 / (0.01 + 0.01);
-    const double far = 0.01 / (1.0 + 0.01);
-    EXPECT_NEAR(glow.seenFrom(glm::dvec3(0.0), up).g, (near + 5.0 * far) / (near + far), 1e-5);
-    // Far away all points are as near as each other.
-    EXPECT_NEAR(glow.seenFrom({0.0, -1000.0, 0.0}, up).g, 3.0, 0.01);
-}
-
-TEST(ObjectGlow, EveryInstructionSetGivesTheSameBytes)
-{
-    ObjectGlow glow;
-    for (int i = 0; i < 77; ++i) {
-        const glm::dvec3 p(std::sin(3.0 * i), 0.5 + 0.4 * std::cos(5.0 * i), std::sin(7.0 * i));
-        glow.add(
-            p, -glm::normalize(p), 0.01 + 0.001 * i, Rgb(0.1f * static_cast<float>(i), 1.0f, 0.5f));
-    }
-    const glm::dvec3 up(0.0, 1.0, 0.0);
-    for (const double x : {-0.5, 0.0, 0.7}) {
-        const Rgb base = glow.seenFrom(InstructionSet::Base, {x, 0.0, 0.1}, up);
-        EXPECT_NE(base, Rgb(0.0f));
-        for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa)
-            EXPECT_EQ(glow.seenFrom(static_cast<InstructionSet>(isa), {x, 0.0, 0.1}, up), base)
-                << isa;
-    }
-}
-
-ObjectScene whiteBall()
+ObjectScene greyBall()
 {
     std::vector<ObjectScene::Object> objects;
     objects.push_back(
@@ -63,7 +26,7 @@ ObjectScene whiteBall()
 
 TEST(SentLight, IsTheRadianceOfSamplesNearbyThatFaceTheSameWay)
 {
-    const ObjectScene ball = whiteBall();
+    const ObjectScene ball = greyBall();
     const std::vector<ObjectSample> samples = sampleObjects(ball, 300);
     SentLight sent(ball, samples);
     // One half of the ball sends 2, the other nothing.
@@ -81,10 +44,67 @@ TEST(SentLight, IsTheRadianceOfSamplesNearbyThatFaceTheSameWay)
     EXPECT_NEAR(sent.at(-up, -up).g, 0.0f, 0.05f);
     const glm::dvec3 aside(1.0, 0.0, 0.0);
     EXPECT_NEAR(sent.at(aside, aside).g, 1.0f, 0.2f);
-    for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa)
-        EXPECT_EQ(sent.at(static_cast<InstructionSet>(isa), aside, aside),
-                  sent.at(InstructionSet::Base, aside, aside))
-            << isa;
+}
+
+/// Points in the void, where nothing hides them.
+struct Point {
+    glm::dvec3 position, normal;
+    double area = 0.0;
+    float radiance = 0.0f;
+};
+SentLight sentBy(const std::vector<Point>& points)
+{
+    std::vector<ObjectSample> samples;
+    std::vector<Rgb> radiance;
+    for (const Point& point : points) {
+        ObjectSample sample{{}, point.area};
+        sample.point.position = point.position;
+        sample.point.geometric_normal = point.normal;
+        samples.push_back(sample);
+        radiance.emplace_back(point.radiance);
+    }
+    SentLight sent(ObjectScene(std::vector<ObjectScene::Object>{}), samples);
+    sent.update(radiance);
+    return sent;
+}
+
+TEST(SentLight, WeighsWhatFacesAPlaceByItsFormFactor)
+{
+    const glm::dvec3 up(0.0, 1.0, 0.0);
+    EXPECT_EQ(SentLight().seenFrom(glm::dvec3(0.0), up), Rgb(0.0f));
+    const SentLight sent = sentBy({{{0.0, 0.1, 0.0}, -up, 0.01, 1.0f},
+                                   {{0.0, 1.0, 0.0}, -up, 0.01, 5.0f},
+                                   // A surface that looks away, and one below the horizon.
+                                   {{0.1, 0.5, 0.0}, up, 1.0, 100.0f},
+                                   {{0.0, -0.2, 0.0}, up, 1.0, 100.0f}});
+    // Area over squared distance (plus area).
+    const double near = 0.01 / (0.01 + 0.01);
+    const double far = 0.01 / (1.0 + 0.01);
+    EXPECT_NEAR(sent.seenFrom(glm::dvec3(0.0), up).g, (near + 5.0 * far) / (near + far), 1e-5);
+    // Far away all points are as near as each other.
+    EXPECT_NEAR(sent.seenFrom({0.0, -1000.0, 0.0}, up).g, 3.0, 0.01);
+}
+
+TEST(SentLight, EveryInstructionSetGivesTheSameBytes)
+{
+    std::vector<Point> points;
+    for (int i = 0; i < 77; ++i) {
+        const glm::dvec3 p(std::sin(3.0 * i), 0.5 + 0.4 * std::cos(5.0 * i), std::sin(7.0 * i));
+        points.push_back({p, -glm::normalize(p), 0.01 + 0.001 * i, 0.1f * static_cast<float>(i)});
+    }
+    const SentLight sent = sentBy(points);
+    const glm::dvec3 up(0.0, 1.0, 0.0);
+    for (const double x : {-0.5, 0.0, 0.7}) {
+        const glm::dvec3 place(x, 0.0, 0.1);
+        const Rgb seen = sent.seenFrom(place, up, InstructionSet::Base);
+        const Rgb at = sent.at(place, -up, InstructionSet::Base);
+        EXPECT_NE(seen, Rgb(0.0f));
+        EXPECT_NE(at, Rgb(0.0f));
+        for (int isa = 1; isa <= static_cast<int>(bestInstructionSet()); ++isa) {
+            EXPECT_EQ(sent.seenFrom(place, up, static_cast<InstructionSet>(isa)), seen) << isa;
+            EXPECT_EQ(sent.at(place, -up, static_cast<InstructionSet>(isa)), at) << isa;
+        }
+    }
 }
 
 PlaceLight lightFrom(int face_size, const std::function<Rgb(glm::vec3)>& radiance)
@@ -204,7 +224,7 @@ TEST(ObjectSharing, LobesShareAmongNormalsWithinTheirWidth)
     Image<Rgb> picture(4, 1, Rgb(0.0f));
     addShared(pixels, picture);
     EXPECT_NEAR(picture(1, 0).g, 0.5f, 0.15f);
-    // A polish ten times narrower does not reach a normal 0.2 away.
+    // A lobe eleven times narrower does not reach a normal 0.2 away.
     for (std::size_t x = 0; x < 4; ++x) {
         pixels[x].roughness = 0.12f;
         pixels[x].normal = glm::normalize(glm::vec3(0.2f * static_cast<float>(x), 0.0f, 1.0f));

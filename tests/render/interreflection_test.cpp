@@ -2,16 +2,12 @@
 #include "tests/render/insertion_rooms.h"
 #include "tests/support/shapes.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 namespace insitu {
 namespace {
-
-using std::numbers::pi;
 
 InsertionOptions optionsOf(Technique technique)
 {
@@ -32,11 +28,11 @@ ObjectScene ball(float albedo, float emission)
     return ObjectScene({{shapes::model(shapes::sphere({0, 0.6f, 0}, 0.3f, 32), material), {}}});
 }
 
-class LeftOut : public testing::TestWithParam<Technique> {};
+class EachTechnique : public testing::TestWithParam<Technique> {};
 
 // A black ball of radiance L puts π L (r/d)² cos φ onto the floor, and hides (r/d)² cos φ of the
 // even light there: what objects emit is no inter-reflection.
-TEST_P(LeftOut, ALampStillLightsTheFloor)
+TEST_P(EachTechnique, ALampStillLightsTheFloor)
 {
     constexpr double kEmission = 4.0;
     RoomDescription room;
@@ -66,9 +62,8 @@ TEST_P(LeftOut, ALampStillLightsTheFloor)
     EXPECT_GT(compared, 100);
 }
 
-// An even light from everywhere above black ground: a white ball lights neither the floor nor the
-// ball beside it, and what that costs is told.
-TEST_P(LeftOut, ObjectsAreBlackToAllButTheCamera)
+// A white ball lights the room no more than a black one does, and what that costs is told.
+TEST_P(EachTechnique, ObjectsAreBlackToAllButTheCamera)
 {
     const SceneProxy proxy(closedRoom());
     const RoomLight light(proxy, uniform(1.0f), {0, 1, 0}, std::nullopt, coarse(), g_silent);
@@ -113,7 +108,7 @@ ObjectScene boxWithGlowingSide(float emission)
 }
 
 // The floor before the front of a box faces none of its sides: what these send does not get there.
-TEST_P(LeftOut, ASideLightsNotTheFloorBeforeTheFront)
+TEST_P(EachTechnique, ASideLightsNotTheFloorBeforeTheFront)
 {
     RoomDescription room;
     room.floors.push_back({});
@@ -145,7 +140,7 @@ std::string nameOf(const testing::TestParamInfo<Technique>& info)
 }
 
 INSTANTIATE_TEST_SUITE_P(Interreflection,
-                         LeftOut,
+                         EachTechnique,
                          testing::Values(Technique::Reference, Technique::Fiv),
                          nameOf);
 
